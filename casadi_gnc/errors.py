@@ -1,0 +1,41 @@
+"""Exceptions of casadi-gnc: one base class, messages that say what to do."""
+
+from __future__ import annotations
+
+
+class GncError(Exception):
+    """Report anything a user can put right; the command line prints it and exits with 2."""
+
+
+class ProblemError(GncError):
+    """Report a defect of a problem file.
+
+    Parameters
+    ----------
+    message : what was given, what was expected, what to do.
+    place : where in the file, e.g. ``"detumble.toml, line 12, plant.inertia_kg_m2"``.
+    """
+
+    def __init__(self, message: str, place: str = "") -> None:
+        self.place = place
+        super().__init__(f"{place}: {message}" if place else message)
+
+
+class PrinterError(GncError):
+    """Report a symbolic function that cannot be printed as C."""
+
+
+class CompilerError(GncError):
+    """Report a C compiler that is missing or that refused the generated source."""
+
+
+class NoCompilerError(CompilerError):
+    """Report that no C compiler was found on this machine."""
+
+
+class AllocationError(GncError):
+    """Report allocation data that cannot be used: shapes, bounds, weights."""
+
+
+class FlightError(GncError):
+    """Report a flight that cannot be flown as asked."""

@@ -1,0 +1,76 @@
+"""Elementary functions of constants, the same to the last bit on every machine.
+
+Constants that are folded into generated C must not depend on the libm or the BLAS of the machine
+that generates it. Numbers are therefore evaluated in 50-digit decimal arithmetic and rounded once;
+symbols become the CasADi operation, which the C evaluates with its own mathematics.
+"""
+
+from __future__ import annotations
+
+from decimal import Context, Decimal, localcontext
+from typing import Any
+
+import casadi as ca
+
+_CONTEXT = Context(prec=50)
+
+
+def is_number(value: Any) -> bool:
+    """Tell a plain number (also numpy's) from a CasADi expression."""
+    return not isinstance(value, (ca.SX, ca.MX))
+
+
+def exp(x: Any) -> Any:
+    """Return e**x, correctly rounded for a number, symbolic for an expression."""
+    if is_number(x):
+        return float(_CONTEXT.exp(Decimal(float(x))))
+    return ca.exp(x)
+
+
+def phi1(x: Any) -> Any:
+    """Return (e**x - 1)/x, continued by 1 at x = 0.
+
+    It is the gain of a first-order lag over one hold: x(h) = x(0) + h phi1(a h) x'(0) is exact
+    for x' = a x + b with constant a and b, and needs no division by a.
+    """
+    if is_number(x):
+        if float(x) == 0.0:
+            return 1.0
+        with localcontext(_CONTEXT):
+            exact = Decimal(float(x))
+            return float((exact.exp() - 1) / exact)
+    # The unselected branch must stay finite: reverse differentiation multiplies it by zero.
+    small = ca.fabs(x) < 1e-8
+    divisor = ca.if_else(small, 1.0, x)
+    return ca.if_else(small, 1 + x / 2, ca.expm1(divisor) / divisor)
+
+
+def cos_sin(angle: float) -> tuple[float, float]:
+    """Return cosine and sine of an angle [rad], each correctly rounded.
+
+    The Taylor series is summed after the angle was halved until it is below 0.1, then the
+    double-angle formulas undo the halving; 50 digits leave room for the loss on the way.
+    """
+    with localcontext(_CONTEXT):
+        halved, halvings = Decimal(float(angle)), 0
+        while abs(halved) > Decimal("0.1"):
+            halved, halvings = halved / 2, halvings + 1
+        sine, versine, term, order = Decimal(0), Decimal(0), halved, 1
+        while abs(term) > Decimal("1e-60"):  # term = halved**order / order!
+            even = term * halved / (order + 1)
+            sign = 1 if order % 4 == 1 else -1
+            sine, versine = sine + sign * term, versine + sign * even
+            term, order = even * halved / (order + 2), order + 2
+        cosine = 1 - versine
+        for _ in range(halvings):
+            sine, cosine = 2 * sine * cosine, 1 - 2 * sine * sine
+        return float(cosine), float(sine)
+
+
+def log(x: Any) -> Any:
+    """Return ln x, element by element; correctly rounded for numbers, symbolic for expressions."""
+    if not is_number(x):
+        return ca.log(x)
+    numbers = ca.DM(x)
+    logs = [float(_CONTEXT.ln(Decimal(float(value)))) for value in numbers.nonzeros()]
+    return logs[0] if isinstance(x, (int, float)) else ca.DM(logs)

@@ -1,0 +1,98 @@
+"""What every control law is: frozen gains, a named memory, and pure methods.
+
+A law is written once and runs in two ways from the same methods. *Continuous* (`hold = 0`): its
+command and the rate of its memory are evaluated in every stage of the integrator. *Sampled*: the
+measurement is taken every `hold` seconds, the command is held, and `casadi_gnc.laws.sampling`
+advances the memory over the hold.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+
+from casadi_gnc.signals import Layout
+from casadi_gnc.status import StepStatus
+
+
+def gain(
+    unit: str,
+    note: str,
+    *,
+    symbol: str = "",
+    size: int = 1,
+    minimum: float | None = None,
+    above: float | None = None,
+    default: Any = dataclasses.MISSING,
+) -> Any:
+    """Declare a number of a law that a problem file gives.
+
+    Parameters
+    ----------
+    unit, note, symbol : shown in the schema; `symbol` is the paper's.
+    size : 1, or the number of elements of a list.
+    minimum, above : closed or open lower bound of every element.
+    default : value when the file is silent; without one the key is required.
+    """
+    about = {"unit": unit, "note": note, "symbol": symbol, "size": size, "minimum": minimum, "above": above}
+    return dataclasses.field(metadata=about, default=default, kw_only=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """Base of all laws; `eq=False` because == on symbols is no bool.
+
+    Parameters
+    ----------
+    hold : sample period [s]; 0 means continuous.
+    printed : names of the paper's errata to keep as printed (see `errata`).
+    """
+
+    hold: float = dataclasses.field(default=0.0, kw_only=True)
+    printed: frozenset[str] = dataclasses.field(default=frozenset(), kw_only=True)
+
+    #: Errata of the source that this law corrects: name -> one sentence.
+    errata: ClassVar[dict[str, str]] = {}
+    #: Memory, what the law carries from one sample to the next.
+    memory: ClassVar[Layout] = Layout()
+    #: What the law shows besides its command, for records and plots.
+    outputs: ClassVar[Layout] = Layout()
+
+    def sign(self, erratum: str) -> int:
+        """Return -1 where the source's sign is kept as printed, +1 where it is corrected."""
+        return -1 if erratum in self.printed else 1
+
+    def start(self, t: Any, y: Any) -> Any:
+        """Return the memory at the first measurement y: every estimate is zero."""
+        return ca.DM.zeros(self.memory.size)
+
+    def jump(self, t: Any, y: Any, m: Any) -> Any:
+        """Return the memory after a discrete change (switching, re-initialisation) at a sample."""
+        return m
+
+    def command(self, t: Any, y: Any, m: Any) -> Any:
+        """Return the wanted effort, (3,), [N m], before any limit."""
+        raise TypeError(f"{type(self).__name__} defines no command")
+
+    def rate(self, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any:
+        """Return d(memory)/dt.
+
+        `wanted` is `command` as it was, `achieved` what is taken to have been done about it.
+        """
+        return ca.DM.zeros(self.memory.size)
+
+    def status(self, t: Any, y: Any, m: Any) -> dict[StepStatus, Any]:
+        """Return flags (0 or 1 expressions) by status bit."""
+        return {}
+
+    def show(self, t: Any, y: Any, m: Any) -> dict[str, Any]:
+        """Return the signals of `outputs`."""
+        return {}
+
+
+def gains_of(law: type[Law]) -> dict[str, dataclasses.Field]:
+    """Return the fields of a law that a problem file gives, by name."""
+    return {field.name: field for field in dataclasses.fields(law) if "unit" in field.metadata}

@@ -1,0 +1,223 @@
+"""Two engines that run the same tapes: compiled C, and CasADi's virtual machine.
+
+Both advance the same `Carried` columns over a run of samples and write the same rows; with the C
+library's elementary functions they write the same words.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import casadi as ca
+import jinja2
+import numpy as np
+
+from casadi_gnc import assets
+from casadi_gnc.embedded import compilers
+from casadi_gnc.embedded.printer import Math, c_constant, print_function
+from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.tapes import Tapes
+
+#: (limited, previous, lower, upper) -> (forces, status bits, report)
+Solve = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, int, np.ndarray]]
+
+
+@dataclass(eq=False)
+class Carried:
+    """Hold what goes from sample to sample; engines change the arrays in place."""
+
+    x: np.ndarray
+    m: np.ndarray
+    force: np.ndarray
+    good: np.ndarray
+    tally: np.ndarray
+
+
+class Engine(Protocol):
+    """Run a mission's samples."""
+
+    name: str
+
+    def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
+        """Fly `samples` samples from number `first`, filling rows of `record`; return the count flown."""
+        ...
+
+
+class _Flight(ctypes.Structure):
+    _fields_ = [(name, ctypes.c_void_p) for name in ("x", "m", "force", "good", "tally", "record")] + [
+        (name, ctypes.c_long) for name in ("first", "samples", "decimation")
+    ]
+    _fields_ += [("allocator", ctypes.c_void_p)]
+
+
+_ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 7)
+
+
+def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc") -> str:
+    """Return the C of a whole flight: every tape and the loop over them."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    plant, timing = mission.truth, mission.timing
+    return environment.get_template("flight.c.j2").render(
+        title=f"{mission.name}, scheme {scheme.name}",
+        mode=timing.mode,
+        maths=maths,
+        real="double",
+        states=plant.state.size,
+        measurements=plant.measurement.size,
+        memory=scheme.law.memory.size,
+        efforts=scheme.actuation.effectiveness.shape[0],
+        forces=plant.inputs.size,
+        report=scheme.actuation.allocator.report.size,
+        row=tapes.row.size,
+        tally=tapes.tally.size,
+        substeps=timing.substeps,
+        period=c_constant(timing.sample_period),
+        symbolic=tapes.symbolic,
+        export="",
+        tapes=[print_function(tape, maths=maths) for tape in tapes.functions.values()],
+    )
+
+
+class CompiledEngine:
+    """Fly in generated C: a whole run of samples is one call."""
+
+    name = "c"
+
+    def __init__(
+        self,
+        mission: Mission,
+        scheme: Scheme,
+        tapes: Tapes,
+        maths: Math = "gnc",
+        *,
+        compiler: compilers.Compiler | None = None,
+        optimise: str = "-O2",
+    ) -> None:
+        self._report = scheme.actuation.allocator.report.size
+        self.source = flight_source(mission, scheme, tapes, maths)
+        self.compiler = compiler or compilers.find()
+        # Builtins would let the compiler replace the C library's functions by its own folding.
+        flags = (optimise, "-fno-builtin") if maths == "libm" else (optimise,)
+        include = assets.folder("codegen") / "runtime"
+        self.library = compilers.build(self.source, include=include, flags=flags, compiler=self.compiler)
+        self._fly = ctypes.CDLL(str(self.library)).gnc_fly
+        self._fly.restype, self._fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
+        self._failure: BaseException | None = None
+        self._solve = None if tapes.symbolic else scheme.actuation.allocator.solve
+        self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
+        self._callback = _ALLOCATOR(self._allocate)
+
+    def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
+        """Fly in one call; an exception of the allocator (or Ctrl-C in it) is raised here."""
+        columns = (carried.x, carried.m, carried.force, carried.good, carried.tally, record)
+        allocator = None if self._solve is None else ctypes.cast(self._callback, ctypes.c_void_p)
+        flight = _Flight(*(column.ctypes.data for column in columns), first, samples, decimation, allocator)
+        flown = self._fly(ctypes.byref(flight))
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+        return int(flown)
+
+    def _allocate(self, *arguments: Any) -> int:
+        limited, previous, lower, upper, forces, status, report = arguments
+        rows, count = self._sizes
+
+        def view(pointer: Any, size: int) -> np.ndarray:
+            return np.ctypeslib.as_array(pointer, (size,))
+
+        assert self._solve is not None
+        try:
+            found = self._solve(view(limited, rows), view(previous, count), view(lower, count), view(upper, count))
+            view(forces, count)[:], status[0] = found[0], float(found[1])
+            if self._report:
+                view(report, self._report)[:] = found[2]
+        except BaseException as error:  # nothing may propagate through C; `run` raises it again
+            self._failure = error
+            return 1
+        return 0
+
+
+class _Tape:
+    """Call a CasADi function on numpy columns without the cost of its general call."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self._buffer, self._trigger = function.buffer()
+        self._in = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
+        self._out = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        for i, column in enumerate(self._in):
+            if column.size:
+                self._buffer.set_arg(i, memoryview(column))
+        for i, column in enumerate(self._out):
+            if column.size:
+                self._buffer.set_res(i, memoryview(column))
+
+    def __call__(self, *columns: Any) -> Any:
+        for own, column in zip(self._in, columns, strict=True):
+            own[:] = column
+        self._trigger()
+        return self._out[0].copy() if len(self._out) == 1 else [column.copy() for column in self._out]
+
+
+class VirtualMachineEngine:
+    """Fly on CasADi's virtual machine: no compiler needed, some hundred times slower."""
+
+    name = "vm"
+
+    def __init__(self, mission: Mission, scheme: Scheme, tapes: Tapes) -> None:
+        self._tape = {name: _Tape(function) for name, function in tapes.functions.items()}
+        self._timing = mission.timing
+        self._states = mission.truth.state.size
+        self._report = np.zeros(scheme.actuation.allocator.report.size)
+        self._solve: Solve | None = None if tapes.symbolic else scheme.actuation.allocator.solve
+
+    def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
+        """Fly sample by sample, as the loop of `flight.c.j2` does."""
+        tape, kept = self._tape, 0
+        for k in range(first, first + samples):
+            t = k * self._timing.sample_period
+            accepted, m, wanted, limited, flags, force, noted, report = self._control(carried, t, carried.x, carried.m)
+            carried.good[:] = accepted
+            row = tape["observe"](t, carried.x, accepted, m, wanted, limited, force, flags, noted, report)
+            carried.tally[:] = tape["tally"](row, carried.tally)
+            if k % decimation == 0:
+                record[kept] = row
+                kept += 1
+            self._advance(carried, t, accepted, m, wanted, limited, force)
+            carried.x[:] = tape["settle"](carried.x)
+            carried.force[:] = force
+        return samples
+
+    def _control(self, carried: Carried, t: float, x: np.ndarray, m: np.ndarray) -> tuple:
+        tape = self._tape
+        y = tape["sense"](t, x)
+        accepted, m, wanted, limited, lower, upper, flags = tape["before"](t, y, carried.good, m, carried.force)
+        if self._solve is None:
+            return accepted, m, wanted, limited, flags, tape["allocate"](limited, carried.force, lower, upper), 0.0, self._report
+        force, noted, report = self._solve(limited, carried.force.copy(), lower, upper)
+        return accepted, m, wanted, limited, flags, force, float(noted), report
+
+    def _advance(self, carried: Carried, t: float, accepted: Any, m: Any, wanted: Any, limited: Any, force: Any) -> None:
+        tape, h, n = self._tape, self._timing.sample_period, self._states
+        if self._timing.mode == "sampled":
+            carried.m[:] = tape["after"](t, accepted, m, wanted, limited, force)
+            step = h / self._timing.substeps
+            for i in range(self._timing.substeps):
+                carried.x[:] = tape["plant"](t + i * step, carried.x, force)
+            return
+        state = np.concatenate([carried.x, m])
+        slopes = [tape["flow"](t, carried.x, accepted, m, wanted, limited, force)]
+        for length in (h / 2, h / 2, h):
+            moved = tape["point"](state, slopes[-1], length)
+            x, m_stage = moved[:n], moved[n:]
+            y, m_stage, u, v, _, f, *_ = self._control(carried, t + length, x, m_stage)
+            slopes.append(tape["flow"](t + length, x, y, m_stage, u, v, f))
+        joined = tape["join"](state, *slopes)
+        carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -1,0 +1,297 @@
+"""Read problem files: find, check, and build what they describe."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from pydantic import BaseModel, ValidationError
+
+from casadi_gnc import assets, attitude
+from casadi_gnc.allocation import AllocationProblem, ConeAllocator, PseudoInverse
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.laws import LAWS, gains_of
+from casadi_gnc.missions import schema, tapes, toml_place
+from casadi_gnc.missions.mission import Actuation, Metric, Mission, Scheme, Timing
+from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
+from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.thrusters import ThrusterGeometry, corner_errors
+
+
+def shipped() -> list[str]:
+    """Return the names of the problems that come with the installation, e.g. "huang2020/detumble"."""
+    root = assets.folder("problems")
+    return sorted(path.relative_to(root).with_suffix("").as_posix() for path in root.rglob("*.toml"))
+
+
+def locate(problem: str | Path) -> Path:
+    """Return the path of a problem given by a path or by the name of a shipped one."""
+    path = Path(problem)
+    if path.is_file():
+        return path
+    name = path.with_suffix("").as_posix()
+    known = shipped()
+    if name.removeprefix("problems/") in known:
+        return assets.folder("problems") / f"{name.removeprefix('problems/')}.toml"
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f'; did you mean "{near[0]}"?' if near else "; `casadi-gnc problems` lists those that are shipped"
+    raise ProblemError(f"no problem file {str(problem)!r}{hint}")
+
+
+def read(problem: str | Path) -> tuple[Path, str, dict[str, Any]]:
+    """Return path, text and parsed content of a problem file; raise `ProblemError` on bad TOML."""
+    path = locate(problem)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
+    try:
+        return path, text, tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ProblemError(f"is not valid TOML: {error}", path.name) from error
+
+
+def load(problem: str | Path) -> Mission:
+    """Return the mission that a problem file describes.
+
+    Parameters
+    ----------
+    problem : path of a TOML file, or the name of a shipped problem such as "huang2020/detumble".
+
+    Raises
+    ------
+    ProblemError
+        With file, line, key, what was given and what was expected.
+
+    Examples
+    --------
+    >>> mission = load("huang2020/detumble")
+    >>> mission.timing.samples
+    15001
+    """
+    path, text, data = read(problem)
+    kind = data.get("kind")
+    if kind != "mission":
+        place = _place(path, text, ("kind",))
+        raise ProblemError(f'kind is {kind!r}; only a file of kind "mission" can be flown', place)
+    try:
+        model = schema.MissionModel.model_validate(data)
+    except ValidationError as error:
+        raise _explain(error, path, text, data) from None
+    return _build(model, path, text)
+
+
+def _place(path: Path, text: str, key: tuple[str | int, ...]) -> str:
+    line = toml_place.find(text, key)
+    dotted = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in key).lstrip(".")
+    return ", ".join(filter(None, (path.name, f"line {line}" if line else "", dotted)))
+
+
+def _explain(error: ValidationError, path: Path, text: str, data: dict[str, Any]) -> ProblemError:
+    """Return the first complaint of pydantic as one sentence with its place in the file."""
+    problems = error.errors(include_url=False)
+    first = problems[0]
+    key: list[str | int] = []
+    at: Any = data
+    for part in first["loc"]:
+        # Locations of unions also name the alternative that was tried; those are not in the file.
+        inside = (isinstance(at, dict) and part in at) or (isinstance(at, list) and isinstance(part, int))
+        if inside:
+            at = at[part]
+        elif part != first["loc"][-1] or first["type"] not in ("missing",):
+            continue
+        key.append(part)
+    if first["type"] == "extra_forbidden":
+        message = "unknown key" + _near_key(str(key[-1]), first["loc"], data)
+    elif first["type"] == "missing":
+        message = "is missing"
+    elif first["type"] == "value_error":
+        message = str(first["ctx"]["error"])
+    else:
+        message = first["msg"][0].lower() + first["msg"][1:]
+        if not isinstance(at, (dict, list)):
+            message += f", got {at!r}"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return ProblemError(message + more, _place(path, text, tuple(key)))
+
+
+def _near_key(key: str, location: tuple[str | int, ...], data: dict[str, Any]) -> str:
+    """Return a hint at the key that was probably meant."""
+    model: Any = schema.MissionModel
+    for part in location[:-1]:
+        if isinstance(part, str) and isinstance(model, type) and issubclass(model, BaseModel) and part in model.model_fields:
+            kinds = [model.model_fields[part].annotation]
+            while kinds and not (isinstance(kinds[0], type) and issubclass(kinds[0], BaseModel)):
+                kinds = [*getattr(kinds[0], "__args__", ()), *kinds[1:]]
+            if not kinds:
+                break
+            # In a union the table itself tells which alternative is meant.
+            model = kinds[0]
+        elif isinstance(part, str) and part in LAWS:
+            model = next(m for m in _alternatives() if m.model_fields["type"].annotation.__args__[0] == part)
+    near = difflib.get_close_matches(key, list(model.model_fields), 1)
+    return f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(model.model_fields)}"
+
+
+def _alternatives() -> list[Any]:
+    return list(schema.LawModel.__origin__.__args__)  # type: ignore[attr-defined]
+
+
+def _orientation(model: schema.Orientation) -> ca.DM | None:
+    if model.rotation is not None:
+        return ca.DM(model.rotation)
+    if model.rotation_321_rad is not None:
+        return attitude.frame_rotation(*model.rotation_321_rad)
+    return None
+
+
+def _inertia(craft: schema.Spacecraft) -> ca.DM:
+    if craft.inertia_kg_m2 is not None:
+        return ca.DM(craft.inertia_kg_m2)
+    parts = []
+    for part in craft.part:
+        rotation = _orientation(part)
+        turned = ca.DM.eye(3) if rotation is None else rotation
+        parts.append(BodyPart(part.mass_kg, part.inertia_kg_m2, part.position_m, turned))
+    return compose_inertia(parts)
+
+
+class _Craft:
+    """Geometry of one view of the craft: the known one, the true one or the believed one."""
+
+    def __init__(self, craft: schema.Spacecraft, rotation: ca.DM, centre: list[float]) -> None:
+        thrusters = craft.thrusters
+        mounted = ThrusterGeometry.from_rows(thrusters.positions_m, thrusters.directions)
+        self.rotation = rotation
+        self.thrusters = mounted.seen_from(rotation, centre)
+        self.engine_torque = [0.0, 0.0, 0.0]
+        if craft.orbit_engine is not None:
+            engine = craft.orbit_engine
+            nozzle = ThrusterGeometry.from_rows([engine.position_m], [engine.direction]).seen_from(rotation, centre)
+            self.engine_torque = [engine.force_N * entry for entry in np.array(nozzle.effectiveness).ravel()]
+
+
+def _build(model: schema.MissionModel, path: Path, text: str) -> Mission:
+    craft, truth, environment = model.spacecraft, model.truth, model.environment
+    rotation = _orientation(craft)
+    rotation = ca.DM.eye(3) if rotation is None else rotation
+    inertia = _inertia(craft)
+    centre = craft.centre_of_mass_m
+    true_centre = [c + e for c, e in zip(centre, truth.centre_of_mass_error_m, strict=True)]
+    real = _Craft(craft, rotation, true_centre)
+    true_inertia = inertia * truth.inertia_factor if truth.inertia_kg_m2 is None else ca.DM(truth.inertia_kg_m2)
+    plant = CombinedSpacecraft(
+        RigidBody(true_inertia, tuple(real.engine_torque), environment.orbit_rate_rad_per_s),
+        real.thrusters.effectiveness,
+        HarmonicTorque(
+            tuple(environment.constant_torque_N_m),
+            tuple(harmonic.frequency_rad_per_s for harmonic in environment.harmonic),
+            tuple(tuple(harmonic.amplitude_N_m) for harmonic in environment.harmonic),
+        ),
+        craft.rate_limit_rad_per_s,
+    )
+    believed = model.believed
+    thought_rotation = _orientation(believed)
+    thought = _Craft(
+        craft,
+        rotation if thought_rotation is None else thought_rotation,
+        centre if believed.centre_of_mass_m is None else believed.centre_of_mass_m,
+    )
+    body = RigidBody(
+        inertia if believed.inertia_kg_m2 is None else ca.DM(believed.inertia_kg_m2),
+        tuple(thought.engine_torque),
+        environment.orbit_rate_rad_per_s,
+    )
+    timing = Timing(
+        model.timing.mode, model.timing.sample_period_s, model.timing.duration_s, model.timing.plant_substeps
+    )
+    schemes = tuple(
+        _scheme(scheme, i, craft, thought, body, timing, path, text) for i, scheme in enumerate(model.scheme)
+    )
+    mission = Mission(
+        name=path.stem,
+        truth=plant,
+        start=[*model.initial.mrp, *model.initial.rate_rad_per_s],
+        timing=timing,
+        schemes=schemes,
+        title=model.title,
+        source=model.source,
+        digest=hashlib.sha256(text.encode()).hexdigest(),
+    )
+    return _with_metrics(mission, model, path, text)
+
+
+def _with_metrics(mission: Mission, model: schema.MissionModel, path: Path, text: str) -> Mission:
+    """Return the mission with its metrics; each must name a signal that every scheme records."""
+    metrics = []
+    for i, metric in enumerate(model.metric):
+        for scheme in mission.schemes:
+            row = tapes.row_layout(mission, scheme)
+            if metric.signal not in row:
+                message = f"{metric.signal!r} is no signal of scheme {scheme.name}; there is {', '.join(row.names)}"
+                raise ProblemError(message, _place(path, text, ("metric", i, "signal")))
+        unit = "s" if metric.kind == "settling" else tapes.row_layout(mission, mission.schemes[0]).signal(metric.signal).unit
+        metrics.append(Metric(metric.name, metric.kind, metric.signal, metric.threshold, metric.after_s, unit))
+    return replace(mission, metrics=tuple(metrics))
+
+
+def _scheme(
+    model: schema.SchemeModel,
+    index: int,
+    craft: schema.Spacecraft,
+    thought: _Craft,
+    body: RigidBody,
+    timing: Timing,
+    path: Path,
+    text: str,
+) -> Scheme:
+    table: Any = model.law
+    law = LAWS[table.type]
+    named = list(law.errata) if model.as_printed is True else model.as_printed or []
+    for name in named:
+        if name not in law.errata:
+            known = ", ".join(law.errata) or "none"
+            message = f"{table.type} has no erratum {name!r}; known: {known}"
+            raise ProblemError(message, _place(path, text, ("scheme", index, "as_printed")))
+    gains = {key: getattr(table, key) for key in gains_of(law)}
+    gains = {key: ca.DM(value) if isinstance(value, list) else value for key, value in gains.items()}
+    hold = timing.sample_period if timing.mode == "sampled" else 0.0
+    limit, thrusters = model.torque_limit_N_m, craft.thrusters
+    count = thought.thrusters.count
+    actuation = Actuation(
+        effectiveness=thought.thrusters.effectiveness,
+        lower=[thrusters.min_force_N] * count,
+        upper=[thrusters.max_force_N] * count,
+        rate=thrusters.max_force_rate_N_per_s or float("inf"),
+        limit_below=[-value for value in limit],
+        limit_above=limit,
+        allocator=_allocator(model.allocation, thrusters, thought),
+    )
+    return Scheme(
+        model.name, law(body=body, hold=hold, printed=frozenset(named), **gains), actuation, model.feedback, model.title
+    )
+
+
+def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft) -> Any:
+    effectiveness = thought.thrusters.effectiveness
+    if isinstance(model, schema.PinvModel):
+        return PseudoInverse(effectiveness)
+    half = model.centre_of_mass_error_m
+    count = thought.thrusters.count
+    problem = AllocationProblem(
+        effectiveness=np.array(effectiveness),
+        lower=np.full(count, thrusters.min_force_N),
+        upper=np.full(count, thrusters.max_force_N),
+        coupling=np.array(thought.thrusters.directions),
+        errors=corner_errors(thought.rotation, [-value for value in half], list(half)),
+        effort_weight=np.full(count, model.effort_weight),
+        change_weight=np.full(count, model.change_weight),
+        accuracy_weight=model.accuracy_weight,
+    )
+    return ConeAllocator(problem)

@@ -1,0 +1,51 @@
+"""Checks of matrices and vectors in a problem file, with messages that say what is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+
+Rows = list[list[float]]
+
+#: Largest entry of R R' - I for a rotation printed with five digits.
+ROTATION_TOLERANCE = 1e-4
+
+
+def check_rotation(rows: Rows) -> Rows:
+    """Return a rotation as it came; raise `ValueError` telling by how much it is not one."""
+    matrix = np.array(rows)
+    residual = np.abs(matrix @ matrix.T - np.eye(3))
+    if residual.max() > ROTATION_TOLERANCE:
+        lengths = np.linalg.norm(matrix, axis=1)
+        worst = int(np.argmax(np.abs(lengths - 1)))
+        raise ValueError(
+            f"no rotation: the largest entry of R R' - I is {residual.max():.2g}, expected below "
+            f"{ROTATION_TOLERANCE:g}; row {worst + 1} has length {lengths[worst]:.4g}. Look for a mistyped entry"
+        )
+    if np.linalg.det(matrix) < 0:
+        raise ValueError("no rotation but a reflection: its determinant is -1; one axis has the wrong sign")
+    return rows
+
+
+def check_inertia(rows: Rows) -> Rows:
+    """Return an inertia matrix as it came; raise `ValueError` where no body can have it."""
+    matrix = np.array(rows)
+    skew = np.abs(matrix - matrix.T).max()
+    if skew > 1e-9 * np.abs(matrix).max():
+        raise ValueError(f"not symmetric: entries differ from their mirror images by up to {skew:.3g} kg m^2")
+    moments = np.linalg.eigvalsh(matrix)
+    if moments[0] <= 0:
+        raise ValueError(f"not positive definite: its smallest principal moment is {moments[0]:.3g} kg m^2")
+    if moments[2] > (moments[0] + moments[1]) * (1 + 1e-3):
+        raise ValueError(
+            f"no body has these principal moments: {moments[2]:.4g} exceeds the sum of the other two, "
+            f"{moments[0]:.4g} + {moments[1]:.4g} kg m^2"
+        )
+    return rows
+
+
+def check_unit(vector: list[float], prefix: str = "") -> list[float]:
+    """Return a direction as it came; raise `ValueError` if it has not length 1."""
+    length = float(np.linalg.norm(vector))
+    if abs(length - 1) > ROTATION_TOLERANCE:
+        raise ValueError(f"{prefix}a direction of length {length:.4g}, expected a unit vector")
+    return vector

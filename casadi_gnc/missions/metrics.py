@@ -1,0 +1,97 @@
+"""Numbers asked of a flight, each a fold over its samples.
+
+===========  ================================================================================
+kind         value
+===========  ================================================================================
+settling     first time after which the max-norm of the signal stays below `threshold` to the
+             end, [s]; none if it never does
+peak         largest max-norm of the signal from time `after` on
+sample_sum   sum over all samples of the 2-norm of the signal, without a time step (as papers
+             print "accumulated" torque and force)
+===========  ================================================================================
+
+The folds are CasADi functions like everything else: every engine computes them from every sample,
+however few samples are kept. Status bits are counted in the same way, and their first times kept.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc import bounds
+from casadi_gnc.signals import Layout, Signal
+from casadi_gnc.status import StepStatus
+
+if TYPE_CHECKING:
+    from casadi_gnc.missions.mission import Metric
+
+#: "Not yet": no flight has a time below zero.
+NEVER = -1.0
+
+
+def fold(metrics: tuple[Metric, ...], row: Layout) -> tuple[Layout, ca.Function]:
+    """Return the layout of the tally and the function (row, tally) -> tally."""
+    counts = tuple(Signal(f"count_{bit.name}") for bit in StepStatus)
+    firsts = tuple(Signal(f"first_{bit.name}", 1, "s") for bit in StepStatus)
+    layout = Layout((*(Signal(metric.name) for metric in metrics), *counts, *firsts))
+    sample, tally = row.symbol("row"), layout.symbol("tally")
+    now, so_far = row.split(sample), layout.split(tally)
+    parts: dict[str, Any] = {
+        metric.name: _next(metric, getattr(now, metric.signal), now.time, getattr(so_far, metric.name))
+        for metric in metrics
+    }
+    for bit in StepStatus:
+        raised = ca.fmod(ca.floor(now.status / bit.value), 2)
+        count, first = getattr(so_far, f"count_{bit.name}"), getattr(so_far, f"first_{bit.name}")
+        parts[f"count_{bit.name}"] = count + raised
+        parts[f"first_{bit.name}"] = ca.if_else(ca.logic_and(raised, first < 0), now.time, first)
+    result = ca.cse([layout.pack(**parts)])
+    return layout, ca.Function("tally", [sample, tally], result, ["row", "tally"], ["tallied"])
+
+
+def _next(metric: Metric, signal: Any, time: Any, so_far: Any) -> Any:
+    size = bounds.largest(ca.fabs(signal))
+    if metric.kind == "settling":
+        return ca.if_else(size < metric.threshold, so_far, time)
+    if metric.kind == "peak":
+        return ca.if_else(time >= metric.after, bounds.maximum(size, so_far), so_far)
+    return so_far + ca.sqrt(ca.sumsqr(signal))
+
+
+def fresh(metrics: tuple[Metric, ...], layout: Layout) -> np.ndarray:
+    """Return the tally before the first sample."""
+    tally = np.zeros(layout.size)
+    for metric in metrics:
+        tally[layout.place(metric.name)] = NEVER if metric.kind == "settling" else 0.0
+    for bit in StepStatus:
+        tally[layout.place(f"first_{bit.name}")] = NEVER
+    return tally
+
+
+def read(
+    metrics: tuple[Metric, ...], layout: Layout, tally: np.ndarray, last: float, period: float
+) -> dict[str, float | None]:
+    """Return the values of the metrics after the sample at time `last` [s]."""
+    values: dict[str, float | None] = {}
+    for metric in metrics:
+        value = float(tally[layout.place(metric.name)][0])
+        if metric.kind == "settling":
+            # The signal was above its threshold at `value` for the last time, or never.
+            settled = value + period if value >= 0 else 0.0
+            values[metric.name] = settled if value < last else None
+        else:
+            values[metric.name] = value
+    return values
+
+
+def statuses(layout: Layout, tally: np.ndarray) -> dict[StepStatus, tuple[int, float]]:
+    """Return for each status bit that was raised how many samples raised it and when first [s]."""
+    raised = {}
+    for bit in StepStatus:
+        count = int(tally[layout.place(f"count_{bit.name}")][0])
+        if count:
+            raised[bit] = (count, float(tally[layout.place(f"first_{bit.name}")][0]))
+    return raised

@@ -1,0 +1,263 @@
+"""What a mission file may say: keys, units, shapes and ranges.
+
+SI units and radians throughout, with the unit in the key where it helps. Unknown keys are errors.
+The gains of a law are declared once, in the law's own file; their part of the schema is made from
+there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Annotated, Any, Literal, Union
+
+from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
+
+from casadi_gnc.laws import LAWS, Law, gains_of
+from casadi_gnc.missions import matrices
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Rows = Annotated[list[Vector], Field(min_length=1)]
+Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,62}$", description="letters, digits and _")]
+
+
+class Part(BaseModel):
+    """Base of all parts of a file: unknown keys, infinities and NaN are refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+class Orientation(Part):
+    """How the combined frame is turned from the chaser's: a matrix or three angles, not both."""
+
+    rotation: Matrix | None = Field(None, description="R, v_combined = R v_chaser, orthonormal to 1e-4")
+    rotation_321_rad: Vector | None = Field(None, description="yaw, pitch, roll of the frame: R = Rx Ry Rz")
+
+    @field_validator("rotation")
+    @classmethod
+    def _is_rotation(cls, value: list[list[float]] | None) -> list[list[float]] | None:
+        return None if value is None else matrices.check_rotation(value)
+
+    @model_validator(mode="after")
+    def _not_both(self) -> Orientation:
+        if self.rotation is not None and self.rotation_321_rad is not None:
+            raise ValueError("rotation and rotation_321_rad are both given; keep one")
+        return self
+
+
+class Engine(Part):
+    """The orbit-control engine, in the chaser's frame."""
+
+    force_N: NonNegative
+    position_m: Vector
+    direction: Vector
+
+    _unit = field_validator("direction")(matrices.check_unit)
+
+
+class Thrusters(Part):
+    """Attitude thrusters in the chaser's frame; bounds hold for each."""
+
+    positions_m: Rows
+    directions: Rows
+    min_force_N: NonNegative = 0.0
+    max_force_N: Positive
+    max_force_rate_N_per_s: Positive | None = Field(None, description="no limit if left out")
+
+    @field_validator("directions")
+    @classmethod
+    def _are_units(cls, value: list[list[float]]) -> list[list[float]]:
+        return [matrices.check_unit(row, f"thruster {i}: ") for i, row in enumerate(value, 1)]
+
+    @model_validator(mode="after")
+    def _fit(self) -> Thrusters:
+        if len(self.positions_m) != len(self.directions):
+            raise ValueError(f"{len(self.positions_m)} positions but {len(self.directions)} directions")
+        if self.min_force_N > self.max_force_N:
+            raise ValueError(f"min_force_N {self.min_force_N} exceeds max_force_N {self.max_force_N}")
+        return self
+
+
+class BodyPartModel(Orientation):
+    """One part of the composed body (eq. 70); orientation is part frame -> combined frame."""
+
+    mass_kg: Positive
+    inertia_kg_m2: Matrix
+    position_m: Vector
+
+    _spd = field_validator("inertia_kg_m2")(matrices.check_inertia)
+
+
+class Spacecraft(Orientation):
+    """The craft as known: inertia, frames, engine and thrusters."""
+
+    model: Literal["combined_spacecraft"]
+    inertia_kg_m2: Matrix | None = Field(None, description="about the combined centre of mass, combined frame")
+    part: list[BodyPartModel] = Field([], description="parts from which the inertia is composed instead (eq. 70)")
+    centre_of_mass_m: Vector = Field(description="of the combined body from the chaser's, chaser frame")
+    rate_limit_rad_per_s: Positive = Field(10.0, description="larger measured rates per axis are rejected")
+    orbit_engine: Engine | None = None
+    thrusters: Thrusters
+
+    @field_validator("inertia_kg_m2")
+    @classmethod
+    def _spd(cls, value: list[list[float]] | None) -> list[list[float]] | None:
+        return None if value is None else matrices.check_inertia(value)
+
+    @model_validator(mode="after")
+    def _one_inertia(self) -> Spacecraft:
+        if (self.inertia_kg_m2 is None) == (not self.part):
+            raise ValueError("give either inertia_kg_m2 or one or more [[spacecraft.part]], not both")
+        return self
+
+
+class Truth(Part):
+    """How the real craft differs from the known one."""
+
+    inertia_factor: Positive = 1.0
+    inertia_kg_m2: Matrix | None = Field(None, description="true inertia, instead of a factor")
+    centre_of_mass_error_m: Vector = Field([0.0, 0.0, 0.0], description="true minus known, chaser frame")
+
+    @field_validator("inertia_kg_m2")
+    @classmethod
+    def _spd(cls, value: list[list[float]] | None) -> list[list[float]] | None:
+        return None if value is None else matrices.check_inertia(value)
+
+
+class Believed(Orientation):
+    """What the flight software believes where that differs from the known craft."""
+
+    inertia_kg_m2: Matrix | None = None
+    centre_of_mass_m: Vector | None = None
+
+    @field_validator("inertia_kg_m2")
+    @classmethod
+    def _spd(cls, value: list[list[float]] | None) -> list[list[float]] | None:
+        return None if value is None else matrices.check_inertia(value)
+
+
+class Harmonic(Part):
+    """One harmonic of the disturbance torque."""
+
+    frequency_rad_per_s: Positive
+    amplitude_N_m: Vector
+
+
+class Environment(Part):
+    """What acts from outside."""
+
+    orbit_rate_rad_per_s: NonNegative = 0.0
+    constant_torque_N_m: Vector = [0.0, 0.0, 0.0]
+    harmonic: list[Harmonic] = []
+
+
+class Initial(Part):
+    """State at t = 0."""
+
+    mrp: Vector
+    rate_rad_per_s: Vector
+
+
+class TimingModel(Part):
+    """When things happen."""
+
+    mode: Literal["sampled", "continuous"]
+    sample_period_s: Positive
+    duration_s: Positive
+    plant_substeps: Annotated[int, Field(ge=1, le=1000)] = 1
+
+    @model_validator(mode="after")
+    def _whole(self) -> TimingModel:
+        samples = self.duration_s / self.sample_period_s
+        if abs(samples - round(samples)) > 1e-6 * samples or samples > 1e9:
+            raise ValueError(f"duration_s / sample_period_s is {samples:.6g}; expected a whole number up to 1e9")
+        return self
+
+
+class PinvModel(Part):
+    """Pseudo-inverse, then clip."""
+
+    method: Literal["pinv"]
+
+
+class RobustModel(Part):
+    """Robust min-max allocation against errors of the centre of mass."""
+
+    method: Literal["robust"]
+    backend: Literal["clarabel"] = "clarabel"
+    centre_of_mass_error_m: Vector = Field(description="half width of the box of errors, chaser frame")
+    accuracy_weight: Positive = Field(1e6, description="h, weight of the squared torque error")
+    effort_weight: NonNegative = Field(1.0, description="diagonal of M1")
+    change_weight: NonNegative = Field(1.0, description="diagonal of M2")
+
+
+def _law_model(name: str, law: type[Law]) -> type[Part]:
+    """Return the model of a law's table, made from the gains that the law declares."""
+    fields: dict[str, Any] = {"type": (Literal[name], ...)}
+    for key, declared in gains_of(law).items():
+        about = declared.metadata
+        bounds = {"ge": about["minimum"], "gt": about["above"]}
+        number: Any = Annotated[float, Field(**{k: v for k, v in bounds.items() if v is not None})]
+        size = about["size"]
+        kind: Any = number if size == 1 else Annotated[list[number], Field(min_length=size, max_length=size)]
+        symbol = f"{about['symbol']}, " if about["symbol"] else ""
+        text = f"{symbol}{about['note']}" + (f" [{about['unit']}]" if about["unit"] else "")
+        default = ... if declared.default is dataclasses.MISSING else declared.default
+        fields[key] = (kind, Field(default, description=text))
+    return create_model(f"{law.__name__}Gains", __base__=Part, __doc__=f"Gains of the law {name!r}.", **fields)
+
+
+LawModel = Annotated[
+    Union[tuple(_law_model(name, law) for name, law in LAWS.items())],  # noqa: UP007 - made at run time
+    Field(discriminator="type"),
+]
+
+
+class SchemeModel(Part):
+    """One way to fly the mission."""
+
+    name: Name
+    title: str = ""
+    feedback: Literal["achieved", "wanted"] = Field("achieved", description="what observers and anti-windup are told")
+    as_printed: bool | list[str] = Field(False, description="keep the paper's errata: all, or those named")
+    torque_limit_N_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    law: LawModel  # type: ignore[valid-type]
+    allocation: Annotated[PinvModel | RobustModel, Field(discriminator="method")]
+
+
+class MetricModel(Part):
+    """One number asked of every flight."""
+
+    name: Name
+    kind: Literal["settling", "peak", "sample_sum"]
+    signal: str
+    threshold: NonNegative = 0.0
+    after_s: NonNegative = 0.0
+
+
+class MissionModel(Part):
+    """A mission file."""
+
+    format: Literal[1]
+    kind: Literal["mission"]
+    title: str = ""
+    source: str = ""
+    spacecraft: Spacecraft
+    truth: Truth = Truth()
+    believed: Believed = Believed()
+    environment: Environment = Environment()
+    initial: Initial
+    timing: TimingModel
+    scheme: Annotated[list[SchemeModel], Field(min_length=1)]
+    metric: list[MetricModel] = []
+
+    @field_validator("scheme", "metric")
+    @classmethod
+    def _names_differ(cls, value: list[Any]) -> list[Any]:
+        names = [item.name for item in value]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"the name {name!r} is given twice")
+        return value
