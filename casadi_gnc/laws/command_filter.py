@@ -1,8 +1,13 @@
 """Follow a signal by a first-order lag, whose rate is then known without differentiation.
 
-    time_constant x' + x = target
+    x' = (target - x) / time_constant                                                  (32)
 
-Huang, Biggs, Duan (2020), eq. (32): the dynamic surface of the method's name.
+This is the dynamic surface of the method's name (Huang, Biggs, Duan 2020). With `max_rate` the
+rate is bent so that its 2-norm stays below a_max and its direction is kept,
+
+    x' = y / sqrt(1 + |y|^2 / a_max^2),      y = (target - x) / time_constant,
+
+so that a craft with little torque is never asked to accelerate faster than it can.
 """
 
 from __future__ import annotations
@@ -10,13 +15,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
+
 
 @dataclass(frozen=True, eq=False)
 class CommandFilter:
-    """Lag a signal; `time_constant` is tau, [s]."""
+    """Lag a vector; `time_constant` is tau, [s], `max_rate` bounds the norm of the rate."""
 
     time_constant: Any
+    max_rate: Any = None
 
     def rate(self, x: Any, target: Any) -> Any:
         """Return x'."""
-        return (target - x) / self.time_constant
+        rate = (target - x) / self.time_constant
+        if self.max_rate is None:
+            return rate
+        return rate / ca.sqrt(1 + ca.sumsqr(rate) / self.max_rate**2)

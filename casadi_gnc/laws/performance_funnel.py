@@ -73,7 +73,12 @@ class PerformanceFunnel:
         place = self.position(t, s)
         return (ca.log((self.below + place) / (self.above - place)) - exact.log(self.below / self.above)) / 2
 
-    def slope(self, t: Any, s: Any) -> Any:
-        """Return r = de/ds, (n,), positive (eq. 28)."""
+    def spread(self, t: Any, s: Any) -> Any:
+        """Return 1/r = ds/de, (n,), positive and bounded (eq. 28): r itself grows without limit."""
         place = self.position(t, s)
-        return (1 / (place + self.below) + 1 / (self.above - place)) / (2 * self.width(t))
+        return 2 * self.width(t) * (place + self.below) * (self.above - place) / (self.below + self.above)
+
+    def use(self, t: Any, s: Any) -> Any:
+        """Return the largest share of the way to a wall, over the axes: below 1 is inside."""
+        lower, upper = self.walls(t)
+        return bounds.largest(bounds.maximum(s / upper, s / lower))

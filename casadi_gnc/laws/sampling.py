@@ -1,14 +1,14 @@
 """Advance a law's memory over one hold.
 
-Over a hold the measurement, the wanted and the achieved effort are constants, so a memory whose
-rate is affine in the memory itself, m' = A m + b, has the exact solution
+Over a hold the measurement, the wanted and the achieved effort are constants, so those signals of
+the memory whose rate is affine in themselves, m' = A m + b, have the exact solution
 
     m(h) = m(0) + h phi1(h A) m'(0),        phi1(X) = I + X/2! + X^2/3! + ...
 
-which needs no inverse of A. The matrix A is found by differentiation. A memory that is not affine
-(adaptive laws) is advanced by one Runge-Kutta step of order 4.
+which needs no inverse of A. The matrix A is found by differentiation. The other signals (limited
+filters, adaptive laws) are advanced by one Runge-Kutta step of order 4.
 
-A disturbance observer takes the same road; its own feed-through makes that right although the
+A disturbance observer takes the exact road; its own feed-through makes that right although the
 plant does *not* stand still during the hold (see `casadi_gnc.laws.disturbance_observer`).
 """
 
@@ -29,16 +29,33 @@ def advance(law: Law, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any
     symbol = law.memory.symbol("m")
     rate = ca.SX(law.rate(t, y, symbol, wanted, achieved))
     slope = ca.jacobian(rate, symbol)
-    if ca.depends_on(slope, symbol):
-        advanced = _runge_kutta(law, t, y, symbol, wanted, achieved)
-    else:
-        advanced = symbol + law.hold * ca.mtimes(_phi1(slope * law.hold), rate)
-    return ca.substitute(advanced, symbol, m)
+    affine = _affine_rows(law, slope, symbol)
+    moved = symbol[:]
+    if affine:
+        exactly = law.hold * ca.mtimes(_phi1(slope[affine, affine] * law.hold), rate[affine])
+        moved[affine] = symbol[affine] + exactly
+    others = [row for row in range(law.memory.size) if row not in affine]
+    if others:
+        moved[others] = _runge_kutta(law, t, y, symbol, wanted, achieved)[others]
+    return ca.substitute(moved, symbol, m)
+
+
+def _affine_rows(law: Law, slope: ca.SX, symbol: ca.SX) -> list[int]:
+    """Return the rows of the largest set of signals that is affine in itself and needs no other."""
+    places = {name: range(law.memory.size)[law.memory.place(name)] for name in law.memory.names}
+    kept = [name for name, rows in places.items() if not ca.depends_on(slope[list(rows), :], symbol)]
+    while True:
+        inside = [row for name in kept for row in places[name]]
+        outside = [row for row in range(law.memory.size) if row not in inside]
+        leaning = [name for name in kept if outside and slope[list(places[name]), outside].nnz()]
+        if not leaning:
+            return inside
+        kept = [name for name in kept if name not in leaning]
 
 
 def _phi1(a: ca.SX) -> ca.SX:
     """Return phi1 of a constant matrix: element by element if diagonal, else scaled and doubled."""
-    if a.sparsity().is_diag():
+    if a.sparsity().is_diag() or not a.nnz():
         entries = [a[i, i] for i in range(a.shape[0])]
         return ca.diag(ca.vertcat(*(exact.phi1(_number_or_symbol(entry)) for entry in entries)))
     # Taylor to X^13/14! of X = A/2^10, then phi1(2X) = (e^X + I) phi1(X)/2 ten times: below one

@@ -1,0 +1,1 @@
+"""Missions: problem files, the functions of a flight, engines, results."""

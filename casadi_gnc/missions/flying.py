@@ -16,8 +16,6 @@ from casadi_gnc.missions import metrics, tapes
 from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine, VirtualMachineEngine
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission, Mode, Scheme
-from casadi_gnc.signals import Layout
-from casadi_gnc.status import StepStatus
 
 EngineName = Literal["c", "vm"]
 Progress = Callable[[int, int], None]
@@ -85,18 +83,19 @@ def fly(
         "compiler": runner.compiler.version if isinstance(runner, CompiledEngine) else "",
     }
     period = mission.timing.sample_period
+    values = metrics.read(mission.metrics, built.tally, carried.tally, (total - 1) * period, period)
     return Flight(
         mission=mission.name,
         scheme=chosen.name,
         title=chosen.title or chosen.name,
         layout=built.row,
         samples=record,
-        metrics=metrics.read(mission.metrics, built.tally, carried.tally, (total - 1) * period, period),
+        metrics=values,
         metric_units={metric.name: metric.unit for metric in mission.metrics},
         statuses=metrics.statuses(built.tally, carried.tally),
         made=made,
         seconds=seconds,
-        notes=(*mission.warnings, *notes, *_consequences(built.tally, carried.tally)),
+        notes=(*mission.warnings, *notes, *_never(mission, values)),
     )
 
 
@@ -125,13 +124,13 @@ def _engine(
         return VirtualMachineEngine(mission, scheme, built), (note,)
 
 
-def _consequences(layout: Layout, tally: np.ndarray) -> tuple[str, ...]:
-    """Return sentences on statuses that change what the rest of the flight is worth."""
-    notes = []
-    for bit, (count, first) in metrics.statuses(layout, tally).items():
-        if bit in (StepStatus.FUNNEL_LEFT, StepStatus.DIVERGED, StepStatus.ALLOCATION_FAILED):
-            notes.append(f"from t = {first:g} s, {count} samples: {bit.sentences[0]}")
-    return tuple(notes)
+def _never(mission: Mission, values: dict[str, float | None]) -> tuple[str, ...]:
+    """Return a sentence for every settling that did not happen."""
+    return tuple(
+        f"{metric.name}: never; {metric.signal} was not below {metric.threshold:g} to the end of {mission.timing.duration:g} s"
+        for metric in mission.metrics
+        if values[metric.name] is None
+    )
 
 
 def fly_all(mission: Mission, **options: Any) -> list[Flight]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import difflib
 import hashlib
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,9 @@ from pydantic import BaseModel, ValidationError
 from casadi_gnc import assets, attitude
 from casadi_gnc.allocation import AllocationProblem, ConeAllocator, PseudoInverse
 from casadi_gnc.errors import ProblemError
-from casadi_gnc.laws import LAWS, gains_of
+from casadi_gnc.laws import LAWS, PerformanceFunnel, gains_of
 from casadi_gnc.missions import schema, tapes, toml_place
-from casadi_gnc.missions.mission import Actuation, Metric, Mission, Scheme, Timing
+from casadi_gnc.missions.mission import Actuation, Funnel, Metric, Mission, Scheme, Timing
 from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
 from casadi_gnc.rigid_body import RigidBody
 from casadi_gnc.thrusters import ThrusterGeometry, corner_errors
@@ -211,8 +211,9 @@ def _build(model: schema.MissionModel, path: Path, text: str) -> Mission:
     timing = Timing(
         model.timing.mode, model.timing.sample_period_s, model.timing.duration_s, model.timing.plant_substeps
     )
+    funnel = _funnel(model, plant, path, text)
     schemes = tuple(
-        _scheme(scheme, i, craft, thought, body, timing, path, text) for i, scheme in enumerate(model.scheme)
+        _scheme(scheme, i, craft, thought, body, funnel, timing, path, text) for i, scheme in enumerate(model.scheme)
     )
     mission = Mission(
         name=path.stem,
@@ -220,6 +221,7 @@ def _build(model: schema.MissionModel, path: Path, text: str) -> Mission:
         start=[*model.initial.mrp, *model.initial.rate_rad_per_s],
         timing=timing,
         schemes=schemes,
+        funnel=funnel,
         title=model.title,
         source=model.source,
         digest=hashlib.sha256(text.encode()).hexdigest(),
@@ -238,7 +240,31 @@ def _with_metrics(mission: Mission, model: schema.MissionModel, path: Path, text
                 raise ProblemError(message, _place(path, text, ("metric", i, "signal")))
         unit = "s" if metric.kind == "settling" else tapes.row_layout(mission, mission.schemes[0]).signal(metric.signal).unit
         metrics.append(Metric(metric.name, metric.kind, metric.signal, metric.threshold, metric.after_s, unit))
-    return replace(mission, metrics=tuple(metrics))
+    return dataclasses.replace(mission, metrics=tuple(metrics))
+
+
+def _funnel(model: schema.MissionModel, plant: CombinedSpacecraft, path: Path, text: str) -> Funnel | None:
+    """Return the mission's funnel; the start must lie inside."""
+    table = model.funnel
+    if table is None:
+        return None
+    if table.signal not in plant.measurement:
+        known = ", ".join(plant.measurement.names)
+        raise ProblemError(f"{table.signal!r} is not measured; there is {known}", _place(path, text, ("funnel", "signal")))
+    expected = plant.measurement.signal(table.signal).size
+    if len(table.start) != expected:
+        place = _place(path, text, ("funnel", "start"))
+        raise ProblemError(f"{len(table.start)} axes, but {table.signal} has {expected}", place)
+    start = [*model.initial.mrp, *model.initial.rate_rad_per_s][plant.measurement.place(table.signal)]
+    for axis, (s, rho, below, above) in enumerate(zip(start, table.start, table.below, table.above, strict=True), 1):
+        if not -below * rho < s < above * rho:
+            raise ProblemError(
+                f"axis {axis} starts at {s:g}, outside its funnel from {-below * rho:g} to {above * rho:g}; "
+                "widen start, below or above",
+                _place(path, text, ("funnel", "start")),
+            )
+    columns = (ca.DM(getattr(table, key)) for key in ("start", "floor", "decay_per_s", "below", "above"))
+    return Funnel(table.signal, PerformanceFunnel(*columns))
 
 
 def _scheme(
@@ -247,6 +273,7 @@ def _scheme(
     craft: schema.Spacecraft,
     thought: _Craft,
     body: RigidBody,
+    funnel: Funnel | None,
     timing: Timing,
     path: Path,
     text: str,
@@ -262,6 +289,11 @@ def _scheme(
     gains = {key: getattr(table, key) for key in gains_of(law)}
     gains = {key: ca.DM(value) if isinstance(value, list) else value for key, value in gains.items()}
     hold = timing.sample_period if timing.mode == "sampled" else 0.0
+    if "funnel" in {field.name for field in dataclasses.fields(law)}:
+        if funnel is None:
+            place = _place(path, text, ("scheme", index, "law"))
+            raise ProblemError(f"the law {table.type!r} needs a [funnel] table, and the file has none", place)
+        gains["funnel"] = funnel.bounds
     limit, thrusters = model.torque_limit_N_m, craft.thrusters
     count = thought.thrusters.count
     actuation = Actuation(

@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import casadi as ca
 
 from casadi_gnc.errors import FlightError
-from casadi_gnc.laws import Law
+from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.signals import Layout
 
 Mode = Literal["sampled", "continuous"]
@@ -91,6 +91,14 @@ class Scheme:
     title: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class Funnel:
+    """Bounds that a mission sets a measured signal, whichever law flies it."""
+
+    signal: str
+    bounds: PerformanceFunnel
+
+
 @dataclass(frozen=True)
 class Metric:
     """One number asked of a flight; kinds are defined in `casadi_gnc.missions.metrics`."""
@@ -116,6 +124,7 @@ class Mission:
     timing: Timing
     schemes: tuple[Scheme, ...]
     metrics: tuple[Metric, ...] = ()
+    funnel: Funnel | None = None
     title: str = ""
     source: str = ""
     digest: str = ""

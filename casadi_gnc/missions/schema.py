@@ -153,6 +153,27 @@ class Environment(Part):
     harmonic: list[Harmonic] = []
 
 
+class FunnelModel(Part):
+    """Bounds on a measured signal: -below rho < s < above rho, rho from start to floor."""
+
+    signal: str = "mrp"
+    start: list[Positive]
+    floor: list[Positive]
+    decay_per_s: list[Positive]
+    below: list[Positive] = Field(description="share of rho allowed below zero")
+    above: list[Positive] = Field(description="share of rho allowed above zero")
+
+    @model_validator(mode="after")
+    def _fit(self) -> FunnelModel:
+        sizes = {name: len(getattr(self, name)) for name in ("start", "floor", "decay_per_s", "below", "above")}
+        if len(set(sizes.values())) > 1:
+            raise ValueError("lists of different length: " + ", ".join(f"{k} has {v}" for k, v in sizes.items()))
+        for i, (start, floor) in enumerate(zip(self.start, self.floor, strict=True), 1):
+            if floor > start:
+                raise ValueError(f"axis {i}: floor {floor:g} is wider than start {start:g}")
+        return self
+
+
 class Initial(Part):
     """State at t = 0."""
 
@@ -200,6 +221,8 @@ def _law_model(name: str, law: type[Law]) -> type[Part]:
         about = declared.metadata
         bounds = {"ge": about["minimum"], "gt": about["above"]}
         number: Any = Annotated[float, Field(**{k: v for k, v in bounds.items() if v is not None})]
+        if declared.default is None:
+            number = number | None
         size = about["size"]
         kind: Any = number if size == 1 else Annotated[list[number], Field(min_length=size, max_length=size)]
         symbol = f"{about['symbol']}, " if about["symbol"] else ""
@@ -249,6 +272,7 @@ class MissionModel(Part):
     believed: Believed = Believed()
     environment: Environment = Environment()
     initial: Initial
+    funnel: FunnelModel | None = None
     timing: TimingModel
     scheme: Annotated[list[SchemeModel], Field(min_length=1)]
     metric: list[MetricModel] = []

@@ -152,10 +152,29 @@ def row_layout(mission: Mission, scheme: Scheme) -> Layout:
             Signal("achieved", rows, "N m"),
             *mission.truth.inputs.signals,
             *scheme.law.outputs.signals,
+            *_funnel_signals(mission),
             *scheme.actuation.allocator.report.signals,
             Signal("status", 1),
         )
     )
+
+
+def _funnel_signals(mission: Mission) -> tuple[Signal, ...]:
+    if mission.funnel is None:
+        return ()
+    watched = mission.truth.measurement.signal(mission.funnel.signal)
+    walls = (Signal(name, watched.size, watched.unit) for name in ("funnel_lower", "funnel_upper"))
+    return (*walls, Signal("funnel_use"))
+
+
+def _watch_funnel(mission: Mission, s: Any) -> tuple[dict[str, Any], Any]:
+    """Return the walls and the use of the mission's funnel, and whether the signal has left it."""
+    if mission.funnel is None:
+        return {}, ca.SX(0)
+    funnel, watched = mission.funnel.bounds, s.y[mission.truth.measurement.place(mission.funnel.signal)]
+    lower, upper = funnel.walls(s.t)
+    shown = {"funnel_lower": lower, "funnel_upper": upper, "funnel_use": funnel.use(s.t, watched)}
+    return shown, funnel.left(s.t, watched)
 
 
 def _observe(mission: Mission, scheme: Scheme, s: Any) -> ca.Function:
@@ -169,6 +188,9 @@ def _observe(mission: Mission, scheme: Scheme, s: Any) -> ca.Function:
     shown = scheme.law.show(s.t, seen, s.m)
     diverged = ca.logic_not(bounds.all_of(ca.fabs(s.x) <= CREDIBLE))
     flags_of_flight = StepStatus.EFFORT_SHORT.value * short + StepStatus.DIVERGED.value * diverged
+    walls, left = _watch_funnel(mission, s)
+    if StepStatus.FUNNEL_LEFT not in scheme.law.status(s.t, seen, s.m):
+        flags_of_flight += StepStatus.FUNNEL_LEFT.value * left
     row = row_layout(mission, scheme).pack(
         time=s.t,
         **vars(mission.truth.state.split(s.x)),
@@ -177,6 +199,7 @@ def _observe(mission: Mission, scheme: Scheme, s: Any) -> ca.Function:
         achieved=made,
         **vars(mission.truth.inputs.split(s.force)),
         **shown,
+        **walls,
         **vars(report.split(noted)),
         status=flags + allocation + flags_of_flight,
     )

@@ -1,0 +1,79 @@
+"""`casadi-gnc doctor`: what is installed, what is missing, and what that costs."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata, util
+from typing import Annotated, Any
+
+import typer
+
+#: Packages of the core, then of extras: package, module to look for, extra, what it gives.
+_CORE = ("casadi", "numpy", "scipy", "proxsuite", "qpsolvers", "matplotlib", "clarabel", "daqp", "pydantic", "typer")
+_EXTRAS = (
+    ("scs", "scs", "solvers", "a second conic solver"),
+    ("piqp", "piqp", "solvers", "a QP solver for the non-robust allocation"),
+    ("osqp", "osqp", "solvers", "a QP solver for the non-robust allocation"),
+    ("highspy", "highspy", "solvers", "a QP solver for the non-robust allocation"),
+    ("quadprog", "quadprog", "solvers", "a QP solver for the non-robust allocation"),
+    ("ziglang", "ziglang", "zig", "a C compiler from a wheel, for machines without one"),
+)
+
+
+def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False) -> None:
+    """Print versions, compilers, solvers, the cache folder, what is missing and what that costs."""
+    report = examine()
+    if json:
+        import json as encoder
+
+        typer.echo(encoder.dumps(report, indent=2))
+        return
+    typer.echo(f"casadi-gnc {report['casadi_gnc']}, Python {report['python']}, {report['platform']}")
+    typer.echo("packages   " + ", ".join(f"{name} {version}" for name, version in report["packages"].items()))
+    typer.echo("compilers  " + (", ".join(f"{c['command']} ({c['version']})" for c in report["compilers"]) or "none"))
+    typer.echo("solvers    " + ", ".join(report["solvers"]))
+    typer.echo(f"cache      {report['cache']['folder']} ({report['cache']['libraries']} compiled libraries)")
+    for missing in report["missing"]:
+        typer.echo(f"missing    {missing['what']}: {missing['cost']}")
+    if not report["missing"]:
+        typer.echo("missing    nothing")
+
+
+def examine() -> dict[str, Any]:
+    """Return what the doctor finds, as plain data."""
+    from casadi_gnc.embedded import compilers
+
+    packages, missing = {}, []
+    for name in _CORE:
+        try:
+            packages[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            missing.append({"what": name, "cost": f"a required package; pip install {name}"})
+    for name, module, extra, gives in _EXTRAS:
+        if util.find_spec(module) is None:
+            missing.append({"what": name, "cost": f'no {gives}; pip install "casadi-gnc[{extra}]"'})
+        else:
+            packages[name] = metadata.version(name)
+    found = compilers.available()
+    if not found:
+        missing.append({"what": "C compiler", "cost": "flights run on CasADi's virtual machine, some fifty times slower"})
+    folder = compilers.cache_folder()
+    libraries = len(list(folder.glob("*.so")) + list(folder.glob("*.dll"))) if folder.is_dir() else 0
+    return {
+        "casadi_gnc": metadata.version("casadi-gnc"),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "packages": packages,
+        "compilers": [{"command": " ".join(c.command), "version": c.version} for c in found],
+        "solvers": _solvers(),
+        "cache": {"folder": str(folder), "libraries": libraries},
+        "missing": missing,
+    }
+
+
+def _solvers() -> list[str]:
+    """Return the allocation back ends that can be used here."""
+    found = ["pinv"]
+    if util.find_spec("clarabel") is not None:
+        found.append("clarabel")
+    return found

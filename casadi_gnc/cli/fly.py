@@ -1,0 +1,134 @@
+"""`casadi-gnc fly`: fly a problem file and write signals, summary and pictures."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from casadi_gnc.missions.flight import Flight
+    from casadi_gnc.missions.mission import Mission
+
+
+class EngineChoice(str, Enum):
+    """Who computes."""
+
+    c = "c"
+    vm = "vm"
+
+
+class MathChoice(str, Enum):
+    """Whose elementary functions."""
+
+    gnc = "gnc"
+    libm = "libm"
+
+
+class ModeChoice(str, Enum):
+    """How the law is run."""
+
+    sampled = "sampled"
+    continuous = "continuous"
+
+
+def fly(
+    problem: Annotated[str, typer.Argument(help="A problem file, or the name of a shipped one.")],
+    out: Annotated[Path, typer.Option(help="Folder for signals, summary and pictures.")] = Path("out"),
+    scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
+    engine: Annotated[EngineChoice, typer.Option(help="Compiled C, or CasADi's virtual machine.")] = EngineChoice.c,
+    math: Annotated[MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")] = MathChoice.gnc,
+    mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the file's own mode.")] = None,
+    decimation: Annotated[int, typer.Option(min=1, help="Keep every so many-th sample.")] = 1,
+    plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
+    json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
+) -> None:
+    """Fly a mission and write <scheme>.npz, summary.json and pictures."""
+    from casadi_gnc.missions import flight as results
+    from casadi_gnc.missions.flying import fly as fly_one
+    from casadi_gnc.missions.loading import load
+
+    mission = load(problem)
+    chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
+    folder = results.prepare_folder(out)
+    flights, written = [], []
+    for name in dict.fromkeys(chosen):
+        with _Progress(name, quiet=json) as progress:
+            flights.append(
+                fly_one(
+                    mission, name, engine=engine.value, maths=math.value, mode=mode.value if mode else None,
+                    decimation=decimation, progress=progress,
+                )
+            )  # fmt: skip
+        written.append(flights[-1].save(folder))
+    written.append(results.save_summary(folder, flights))
+    if plots:
+        written += _draw(mission, flights, folder)
+    if json:
+        typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
+    else:
+        _print(mission, flights, written)
+
+
+def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
+    from casadi_gnc.missions import plots
+
+    pictures = [plots.plot_flight(mission, flight, folder) for flight in flights]
+    if len(flights) > 1:
+        pictures.append(plots.plot_comparison(mission, flights, folder))
+    return pictures
+
+
+class _Progress:
+    """Show a bar once a flight has taken a second; on a terminal only."""
+
+    def __init__(self, name: str, *, quiet: bool) -> None:
+        import time
+
+        self._name, self._quiet, self._since, self._bar, self._task = name, quiet, time.monotonic(), None, None
+
+    def __enter__(self) -> Any:
+        return self._update
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def _update(self, done: int, total: int) -> None:
+        import time
+
+        if self._quiet or (self._bar is None and time.monotonic() - self._since < 1.0):
+            return
+        if self._bar is None:
+            from rich.console import Console
+            from rich.progress import Progress
+
+            self._bar = Progress(console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task(self._name, total=total)
+        self._bar.update(self._task, completed=done)  # type: ignore[arg-type]
+
+
+def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(soft_wrap=True)
+    table = Table(title=mission.title or mission.name)
+    table.add_column("scheme")
+    for metric in mission.metrics:
+        unit = f" [{metric.unit}]" if metric.unit else ""
+        table.add_column((metric.name.replace("_", " ") + unit).replace("[", r"\["), justify="right")
+    for flight in flights:
+        values = [flight.metrics[metric.name] for metric in mission.metrics]
+        table.add_row(flight.scheme, *("never" if value is None else f"{value:.5g}" for value in values))
+    console.print(table, soft_wrap=False)
+    for flight in flights:
+        for bit, (count, first) in flight.statuses.items():
+            share = 100 * count / mission.timing.samples
+            console.print(f"{flight.scheme}: {share:.3g} % of samples, first at {first:g} s: {bit.sentences[0]}", highlight=False)
+        for note in flight.notes:
+            console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
+    console.print("wrote " + ", ".join(str(path) for path in written), highlight=False, markup=False)

@@ -1,0 +1,49 @@
+"""Shared fixtures: random numbers with a seed, compilers that CI must have, missions loaded once."""
+
+import os
+import shutil
+
+import numpy as np
+import pytest
+
+import casadi_gnc
+from casadi_gnc.embedded.compilers import Compiler, _probe
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20200106)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory):
+    """Keep compiled libraries of a test run away from the user's cache."""
+    folder = tmp_path_factory.mktemp("cache")
+    before = os.environ.get("CASADI_GNC_CACHE")
+    os.environ["CASADI_GNC_CACHE"] = str(folder)
+    yield folder
+    if before is None:
+        del os.environ["CASADI_GNC_CACHE"]
+    else:
+        os.environ["CASADI_GNC_CACHE"] = before
+
+
+@pytest.fixture(scope="session")
+def detumble() -> casadi_gnc.Mission:
+    return casadi_gnc.load("huang2020/detumble")
+
+
+def need_compiler(name: str) -> Compiler:
+    """Return a compiler by name; without it fail in CI and skip, by name, elsewhere."""
+    if shutil.which(name) is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail(f"CI needs the compiler {name}")
+        pytest.skip(f"the compiler {name} is not installed")
+    found = _probe((name,))
+    assert found is not None
+    return found
+
+
+@pytest.fixture(params=["gcc", "clang"])
+def compiler(request: pytest.FixtureRequest) -> Compiler:
+    return need_compiler(request.param)
