@@ -12,7 +12,7 @@ from casadi_gnc import attitude
 
 def inverse3(matrix: Any) -> Any:
     """Invert a 3 x 3 matrix by cofactors: plain arithmetic, so constants fold deterministically."""
-    m = ca.SX(matrix) if isinstance(matrix, (ca.SX, ca.MX)) else ca.DM(matrix)
+    m: Any = matrix if isinstance(matrix, (ca.SX, ca.MX)) else ca.DM(matrix)
     rows = [m[i, :].T for i in range(3)]
     columns = [ca.cross(rows[1], rows[2]), ca.cross(rows[2], rows[0]), ca.cross(rows[0], rows[1])]
     return ca.horzcat(*columns) / ca.dot(rows[0], columns[0])

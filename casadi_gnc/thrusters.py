@@ -48,9 +48,7 @@ class ThrusterGeometry:
     def seen_from(self, rotation: ca.DM, centre_of_mass: list[float]) -> ThrusterGeometry:
         """Return d = R (d_s - r_c) and e = R e_s (eqs 8-9)."""
         shift = ca.repmat(ca.DM(centre_of_mass), 1, self.count)
-        return ThrusterGeometry(
-            ca.mtimes(rotation, self.positions - shift), ca.mtimes(rotation, self.directions)
-        )
+        return ThrusterGeometry(ca.mtimes(rotation, self.positions - shift), ca.mtimes(rotation, self.directions))
 
     @property
     def effectiveness(self) -> ca.DM:
@@ -65,8 +63,5 @@ def corner_errors(rotation: ca.DM, lower: list[float], upper: list[float]) -> np
     A centre of mass that lies dr further along the chaser's axes moves every thruster by -R dr, so
     dA F = -(R dr) x (net force) and D_v = -[R dr_v]x (eq. 61): robustness penalises net force.
     """
-    corners = [
-        -ca.skew(ca.mtimes(rotation, ca.DM(corner)))
-        for corner in product(*zip(lower, upper, strict=True))
-    ]
+    corners = [-ca.skew(ca.mtimes(rotation, ca.DM(corner))) for corner in product(*zip(lower, upper, strict=True))]
     return np.array([np.array(corner) for corner in corners])

@@ -28,9 +28,7 @@ ROUNDING_FLOOR = 1e-10
 class ConeAllocator:
     """Solve one allocation a sample; every answer is clipped into its box and certified."""
 
-    report = Layout(
-        (Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations"))
-    )
+    report = Layout((Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations")))
 
     def __init__(self, problem: AllocationProblem) -> None:
         self.problem = problem
@@ -45,9 +43,11 @@ class ConeAllocator:
         self._solver = self._set_up(len(self._reach))
 
     def _set_up(self, count: int) -> Any:
-        import clarabel
+        from importlib import import_module
+
         from scipy import sparse
 
+        clarabel: Any = import_module("clarabel")  # lazily, and it tells type checkers nothing
         rows, vertices = self.problem.effectiveness.shape[0], self.problem.vertices
         blocks = [np.hstack([np.eye(count), np.zeros((count, 1))]), np.hstack([-np.eye(count), np.zeros((count, 1))])]
         for vertex in vertices:
@@ -60,9 +60,9 @@ class ConeAllocator:
         settings.verbose = False
         settings.presolve_enable = False
         settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = 1e-12, 1e-9, 1e-9
-        quadratic = sparse.diags(np.append(self._quadratic, 0.0)).tocsc()
+        quadratic = sparse.csc_matrix(np.diag(np.append(self._quadratic, 0.0)))
         lhs = sparse.csc_matrix(np.vstack(blocks))
-        self._rhs = np.zeros(lhs.shape[0])
+        self._rhs = np.zeros(sum(len(block) for block in blocks))
         return clarabel.DefaultSolver(quadratic, np.zeros(count + 1), lhs, self._rhs, cones, settings)
 
     def solve(

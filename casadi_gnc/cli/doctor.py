@@ -56,7 +56,9 @@ def examine() -> dict[str, Any]:
             packages[name] = metadata.version(name)
     found = compilers.available()
     if not found:
-        missing.append({"what": "C compiler", "cost": "flights run on CasADi's virtual machine, some fifty times slower"})
+        missing.append(
+            {"what": "C compiler", "cost": "flights run on CasADi's virtual machine, some fifty times slower"}
+        )
     folder = compilers.cache_folder()
     libraries = len(list(folder.glob("*.so")) + list(folder.glob("*.dll"))) if folder.is_dir() else 0
     return {

@@ -39,7 +39,9 @@ def fly(
     out: Annotated[Path, typer.Option(help="Folder for signals, summary and pictures.")] = Path("out"),
     scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="Compiled C, or CasADi's virtual machine.")] = EngineChoice.c,
-    math: Annotated[MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")] = MathChoice.gnc,
+    math: Annotated[
+        MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")
+    ] = MathChoice.gnc,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the file's own mode.")] = None,
     decimation: Annotated[int, typer.Option(min=1, help="Keep every so many-th sample.")] = 1,
     plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
@@ -128,7 +130,9 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
     for flight in flights:
         for bit, (count, first) in flight.statuses.items():
             share = 100 * count / mission.timing.samples
-            console.print(f"{flight.scheme}: {share:.3g} % of samples, first at {first:g} s: {bit.sentences[0]}", highlight=False)
+            console.print(
+                f"{flight.scheme}: {share:.3g} % of samples, first at {first:g} s: {bit.sentences[0]}", highlight=False
+            )
         for note in flight.notes:
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
     console.print("wrote " + ", ".join(str(path) for path in written), highlight=False, markup=False)

@@ -56,6 +56,8 @@ class Law:
 
     #: Errata of the source that this law corrects: name -> one sentence.
     errata: ClassVar[dict[str, str]] = {}
+    #: Measured signals that the law reads, by the plant's names.
+    inputs: ClassVar[Layout] = Layout()
     #: Memory, what the law carries from one sample to the next.
     memory: ClassVar[Layout] = Layout()
     #: What the law shows besides its command, for records and plots.

@@ -1,5 +1,6 @@
 """Attitude PD law u = -k_sigma sigma - k_omega omega: the baseline of the slew in Huang, Biggs,
-Duan (2020), section 5.2, whose gains are not printed."""
+Duan (2020), section 5.2, whose gains are not printed.
+"""
 
 from __future__ import annotations
 

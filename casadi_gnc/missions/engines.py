@@ -149,15 +149,17 @@ class _Tape:
     """Call a CasADi function on numpy columns without the cost of its general call."""
 
     def __init__(self, function: ca.Function) -> None:
-        self._buffer, self._trigger = function.buffer()
+        buffer: Any
+        buffer, self._trigger = function.buffer()
+        self._buffer = buffer  # the trigger points into it
         self._in = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
         self._out = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
         for i, column in enumerate(self._in):
             if column.size:
-                self._buffer.set_arg(i, memoryview(column))
+                buffer.set_arg(i, memoryview(column.data))
         for i, column in enumerate(self._out):
             if column.size:
-                self._buffer.set_res(i, memoryview(column))
+                buffer.set_res(i, memoryview(column.data))
 
     def __call__(self, *columns: Any) -> Any:
         for own, column in zip(self._in, columns, strict=True):
@@ -200,11 +202,22 @@ class VirtualMachineEngine:
         y = tape["sense"](t, x)
         accepted, m, wanted, limited, lower, upper, flags = tape["before"](t, y, carried.good, m, carried.force)
         if self._solve is None:
-            return accepted, m, wanted, limited, flags, tape["allocate"](limited, carried.force, lower, upper), 0.0, self._report
+            return (
+                accepted,
+                m,
+                wanted,
+                limited,
+                flags,
+                tape["allocate"](limited, carried.force, lower, upper),
+                0.0,
+                self._report,
+            )
         force, noted, report = self._solve(limited, carried.force.copy(), lower, upper)
         return accepted, m, wanted, limited, flags, force, float(noted), report
 
-    def _advance(self, carried: Carried, t: float, accepted: Any, m: Any, wanted: Any, limited: Any, force: Any) -> None:
+    def _advance(
+        self, carried: Carried, t: float, accepted: Any, m: Any, wanted: Any, limited: Any, force: Any
+    ) -> None:
         tape, h, n = self._tape, self._timing.sample_period, self._states
         if self._timing.mode == "sampled":
             carried.m[:] = tape["after"](t, accepted, m, wanted, limited, force)

@@ -124,5 +124,7 @@ def prepare_folder(folder: Path) -> Path:
             pass
     except OSError as error:
         reason = error.strerror or str(error)
-        raise FlightError(f"cannot write to the output folder {str(folder)!r}: {reason}; choose another --out") from error
+        raise FlightError(
+            f"cannot write to the output folder {str(folder)!r}: {reason}; choose another --out"
+        ) from error
     return folder

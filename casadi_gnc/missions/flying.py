@@ -79,7 +79,7 @@ def fly(
         "feedback": chosen.feedback,
         "problem_sha256": mission.digest,
         "casadi_gnc": metadata.version("casadi-gnc"),
-        "casadi": ca.__version__,
+        "casadi": metadata.version("casadi"),
         "compiler": runner.compiler.version if isinstance(runner, CompiledEngine) else "",
     }
     period = mission.timing.sample_period
@@ -120,14 +120,14 @@ def _engine(
     try:
         return CompiledEngine(mission, scheme, built, maths), ()
     except NoCompilerError as error:
-        note = f"{error}. Flown on CasADi's virtual machine instead: some fifty times slower, and with the C library's last bits"
+        note = f"{error}. Flown on CasADi's virtual machine instead: some fifty times slower, with libm's last bits"
         return VirtualMachineEngine(mission, scheme, built), (note,)
 
 
 def _never(mission: Mission, values: dict[str, float | None]) -> tuple[str, ...]:
     """Return a sentence for every settling that did not happen."""
     return tuple(
-        f"{metric.name}: never; {metric.signal} was not below {metric.threshold:g} to the end of {mission.timing.duration:g} s"
+        f"{metric.name}: never; at {mission.timing.duration:g} s {metric.signal} was still above {metric.threshold:g}"
         for metric in mission.metrics
         if values[metric.name] is None
     )

@@ -48,7 +48,7 @@ def fold(metrics: tuple[Metric, ...], row: Layout) -> tuple[Layout, ca.Function]
         count, first = getattr(so_far, f"count_{bit.name}"), getattr(so_far, f"first_{bit.name}")
         parts[f"count_{bit.name}"] = count + raised
         parts[f"first_{bit.name}"] = ca.if_else(ca.logic_and(raised, first < 0), now.time, first)
-    result = ca.cse([layout.pack(**parts)])
+    result = ca.cse([ca.SX(layout.pack(**parts))])
     return layout, ca.Function("tally", [sample, tally], result, ["row", "tally"], ["tallied"])
 
 

@@ -1,5 +1,6 @@
 """A mission: a plant, what the flight software believes of it, how it is timed, and one or more
-schemes that could fly it."""
+schemes that could fly it.
+"""
 
 from __future__ import annotations
 
@@ -156,24 +157,24 @@ class Mission:
 
     def plant(self) -> ca.Function:
         """Return x' as a function (t, x, force) -> rate, with the ports of the plant's layouts."""
-        from casadi_gnc.missions import tapes
+        from casadi_gnc.missions import functions
 
-        return tapes.plant_rate(self)
+        return functions.plant_rate(self)
 
     def law(self, scheme: str | None = None) -> ca.Function:
         """Return the law as (t, y, m, achieved) -> (wanted, rate of memory, shown signals)."""
-        from casadi_gnc.missions import tapes
+        from casadi_gnc.missions import functions
 
-        return tapes.law_function(self, self.scheme(scheme))
+        return functions.law_function(self, self.scheme(scheme))
 
     def step(self, scheme: str | None = None) -> ca.Function:
         """Return one sample of the controller: (t, y, good, m, force) -> (force, m, ...)."""
-        from casadi_gnc.missions import tapes
+        from casadi_gnc.missions import functions
 
-        return tapes.step_function(self, self.scheme(scheme))
+        return functions.step_function(self, self.scheme(scheme))
 
     def closed_loop(self, scheme: str | None = None) -> ca.Function:
         """Return one sample period of the whole loop: (t, x, m, force, good) -> the same, later."""
-        from casadi_gnc.missions import tapes
+        from casadi_gnc.missions import functions
 
-        return tapes.closed_loop_function(self, self.scheme(scheme))
+        return functions.closed_loop_function(self, self.scheme(scheme))

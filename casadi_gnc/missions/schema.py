@@ -32,8 +32,8 @@ class Part(BaseModel):
 class Orientation(Part):
     """How the combined frame is turned from the chaser's: a matrix or three angles, not both."""
 
-    rotation: Matrix | None = Field(None, description="R, v_combined = R v_chaser, orthonormal to 1e-4")
-    rotation_321_rad: Vector | None = Field(None, description="yaw, pitch, roll of the frame: R = Rx Ry Rz")
+    rotation: Matrix | None = Field(default=None, description="R, v_combined = R v_chaser, orthonormal to 1e-4")
+    rotation_321_rad: Vector | None = Field(default=None, description="yaw, pitch, roll of the frame: R = Rx Ry Rz")
 
     @field_validator("rotation")
     @classmethod
@@ -64,7 +64,7 @@ class Thrusters(Part):
     directions: Rows
     min_force_N: NonNegative = 0.0
     max_force_N: Positive
-    max_force_rate_N_per_s: Positive | None = Field(None, description="no limit if left out")
+    max_force_rate_N_per_s: Positive | None = Field(default=None, description="no limit if left out")
 
     @field_validator("directions")
     @classmethod
@@ -94,10 +94,12 @@ class Spacecraft(Orientation):
     """The craft as known: inertia, frames, engine and thrusters."""
 
     model: Literal["combined_spacecraft"]
-    inertia_kg_m2: Matrix | None = Field(None, description="about the combined centre of mass, combined frame")
-    part: list[BodyPartModel] = Field([], description="parts from which the inertia is composed instead (eq. 70)")
+    inertia_kg_m2: Matrix | None = Field(default=None, description="about the combined centre of mass, combined frame")
+    part: list[BodyPartModel] = Field(
+        default=[], description="parts from which the inertia is composed instead (eq. 70)"
+    )
     centre_of_mass_m: Vector = Field(description="of the combined body from the chaser's, chaser frame")
-    rate_limit_rad_per_s: Positive = Field(10.0, description="larger measured rates per axis are rejected")
+    rate_limit_rad_per_s: Positive = Field(default=10.0, description="larger measured rates per axis are rejected")
     orbit_engine: Engine | None = None
     thrusters: Thrusters
 
@@ -117,8 +119,8 @@ class Truth(Part):
     """How the real craft differs from the known one."""
 
     inertia_factor: Positive = 1.0
-    inertia_kg_m2: Matrix | None = Field(None, description="true inertia, instead of a factor")
-    centre_of_mass_error_m: Vector = Field([0.0, 0.0, 0.0], description="true minus known, chaser frame")
+    inertia_kg_m2: Matrix | None = Field(default=None, description="true inertia, instead of a factor")
+    centre_of_mass_error_m: Vector = Field(default=[0.0, 0.0, 0.0], description="true minus known, chaser frame")
 
     @field_validator("inertia_kg_m2")
     @classmethod
@@ -209,9 +211,9 @@ class RobustModel(Part):
     method: Literal["robust"]
     backend: Literal["clarabel"] = "clarabel"
     centre_of_mass_error_m: Vector = Field(description="half width of the box of errors, chaser frame")
-    accuracy_weight: Positive = Field(1e6, description="h, weight of the squared torque error")
-    effort_weight: NonNegative = Field(1.0, description="diagonal of M1")
-    change_weight: NonNegative = Field(1.0, description="diagonal of M2")
+    accuracy_weight: Positive = Field(default=1e6, description="h, weight of the squared torque error")
+    effort_weight: NonNegative = Field(default=1.0, description="diagonal of M1")
+    change_weight: NonNegative = Field(default=1.0, description="diagonal of M2")
 
 
 def _law_model(name: str, law: type[Law]) -> type[Part]:
@@ -243,8 +245,10 @@ class SchemeModel(Part):
 
     name: Name
     title: str = ""
-    feedback: Literal["achieved", "wanted"] = Field("achieved", description="what observers and anti-windup are told")
-    as_printed: bool | list[str] = Field(False, description="keep the paper's errata: all, or those named")
+    feedback: Literal["achieved", "wanted"] = Field(
+        default="achieved", description="what observers and anti-windup are told"
+    )
+    as_printed: bool | list[str] = Field(default=False, description="keep the paper's errata: all, or those named")
     torque_limit_N_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
     law: LawModel  # type: ignore[valid-type]
     allocation: Annotated[PinvModel | RobustModel, Field(discriminator="method")]

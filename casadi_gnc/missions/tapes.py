@@ -30,7 +30,6 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc import bounds
-from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import advance
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.mission import Mission, Scheme
@@ -60,7 +59,7 @@ class Tapes:
             raise AttributeError(name) from None
 
 
-class _Signals:
+class Symbols:
     """Symbols of one sample; an SX each, named as the ports are."""
 
     def __init__(self, mission: Mission, scheme: Scheme) -> None:
@@ -218,7 +217,7 @@ def runge_kutta(rate: Any, t: Any, x: Any, h: Any) -> Any:
 
 def build(mission: Mission, scheme: Scheme) -> Tapes:
     """Return all tapes of a scheme in the mission's mode."""
-    s, plant, law, timing = _Signals(mission, scheme), mission.truth, scheme.law, mission.timing
+    s, plant, law, timing = Symbols(mission, scheme), mission.truth, scheme.law, mission.timing
     loop = {"t": s.t, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited, "force": s.force}
     told = achieved(scheme, s.limited, s.force)
     seen = law_inputs(mission, scheme, s.y)
@@ -236,13 +235,13 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
         tapes["allocate"] = function("allocate", ports, {"allocated": forces})
     if timing.mode == "sampled":
         tapes["after"] = function("after", loop, {"memory": advance(law, s.t, seen, s.m, s.wanted, told)})
-        stepped = runge_kutta(
-            lambda t, x: plant.rate(t, x, s.force), s.t, s.x, timing.sample_period / timing.substeps
-        )
+        stepped = runge_kutta(lambda t, x: plant.rate(t, x, s.force), s.t, s.x, timing.sample_period / timing.substeps)
         tapes["plant"] = function("plant", {"t": s.t, "x": s.x, "force": s.force}, {"stepped": stepped})
     else:
         slope = ca.vertcat(plant.rate(s.t, s.x, s.force), law.rate(s.t, seen, s.m, s.wanted, told))
-        tapes["flow"] = function("flow", {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}}, {"slope": slope})
+        tapes["flow"] = function(
+            "flow", {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}}, {"slope": slope}
+        )
         tapes.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
     row = row_layout(mission, scheme)
     tally, fold = metrics.fold(mission.metrics, row)
@@ -256,65 +255,8 @@ def _integrator(size: int, h: float) -> dict[str, ca.Function]:
     k = [ca.SX.sym(f"k{i}", size) for i in range(1, 5)]
     joined = state + h / 6 * (k[0] + 2 * k[1] + 2 * k[2] + k[3])
     return {
-        "point": function("point", {"state": state, "slope": slope, "length": length}, {"moved": state + length * slope}),
-        "join": function(
-            "join", {"state": state, "k1": k[0], "k2": k[1], "k3": k[2], "k4": k[3]}, {"joined": joined}
+        "point": function(
+            "point", {"state": state, "slope": slope, "length": length}, {"moved": state + length * slope}
         ),
+        "join": function("join", {"state": state, "k1": k[0], "k2": k[1], "k3": k[2], "k4": k[3]}, {"joined": joined}),
     }
-
-
-def plant_rate(mission: Mission) -> ca.Function:
-    """Return (t, x, force) -> rate of the plant."""
-    plant, t = mission.truth, ca.SX.sym("t")
-    x, force = plant.state.symbol("x"), plant.inputs.symbol("force")
-    return function("plant", {"t": t, "x": x, "force": force}, {"rate": plant.rate(t, x, force)})
-
-
-def law_function(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, y, m, achieved) -> (wanted, memory_rate, shown signals...)."""
-    s, law = _Signals(mission, scheme), scheme.law
-    seen = law_inputs(mission, scheme, s.y)
-    told = ca.SX.sym("achieved", scheme.actuation.effectiveness.shape[0])
-    wanted = law.command(s.t, seen, s.m)
-    outputs = {"wanted": wanted, "memory_rate": law.rate(s.t, seen, s.m, wanted, told), **law.show(s.t, seen, s.m)}
-    return function("law", {"t": s.t, "y": s.y, "m": s.m, "achieved": told}, outputs)
-
-
-def _controller(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
-    """Return accepted measurement, memory, force and efforts of one sample, as expressions."""
-    if not scheme.actuation.is_symbolic:
-        raise FlightError(
-            f"scheme {scheme.name!r} allocates by an iterative solver, which has no closed form; "
-            "take a scheme with allocation \"pinv\", or law() and plant() and close the loop yourself"
-        )
-    if mission.timing.mode != "sampled":
-        raise FlightError('step() and closed_loop() are of a sampled mission; use with_timing(mode="sampled")')
-    first = before(mission, scheme, s)
-    force = scheme.actuation.allocator.expression(first["limited"], s.force, first["lower"], first["upper"])
-    seen = law_inputs(mission, scheme, first["accepted"])
-    told = achieved(scheme, first["limited"], force)
-    memory = advance(scheme.law, s.t, seen, first["memory"], first["wanted"], told)
-    return {**first, "force": force, "memory_next": memory}
-
-
-def step_function(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, y, good, m, force) -> (force_next, m_next, good_next, wanted, limited, status)."""
-    s = _Signals(mission, scheme)
-    c = _controller(mission, scheme, s)
-    outputs = {"force_next": c["force"], "m_next": c["memory_next"], "good_next": c["accepted"]}
-    outputs.update(wanted=c["wanted"], limited=c["limited"], status=c["flags"])
-    return function("step", {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "force": s.force}, outputs)
-
-
-def closed_loop_function(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, x, m, force, good) -> (x_next, m_next, force_next, good_next, wanted, limited)."""
-    s = _Signals(mission, scheme)
-    ports = {"t": s.t, "x": s.x, "m": s.m, "force": s.force, "good": s.good}
-    s.y = mission.truth.measure(s.t, s.x)
-    c = _controller(mission, scheme, s)
-    x, h = s.x, mission.timing.sample_period / mission.timing.substeps
-    for i in range(mission.timing.substeps):
-        x = runge_kutta(lambda t, at: mission.truth.rate(t, at, c["force"]), s.t + i * h, x, h)
-    outputs = {"x_next": mission.truth.settle(x), "m_next": c["memory_next"], "force_next": c["force"]}
-    outputs.update(good_next=c["accepted"], wanted=c["wanted"], limited=c["limited"])
-    return function("closed_loop", ports, outputs)

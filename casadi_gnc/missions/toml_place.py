@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path as FilePath
 
 _TABLE = re.compile(r"^\s*(\[\[?)\s*([A-Za-z0-9_.\-\" ]+?)\s*\]\]?\s*(#.*)?$")
 _KEY = re.compile(r"^\s*([A-Za-z0-9_.\-\"]+)\s*=")
@@ -41,6 +42,13 @@ def find(text: str, path: Path) -> int | None:
         if path[:length] in places:
             return places[path[:length]]
     return None
+
+
+def describe(path: FilePath, text: str, key: Path) -> str:
+    """Return "file, line n, table.key[i]" for messages; elements are counted from 1."""
+    line = find(text, key)
+    dotted = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in key).lstrip(".")
+    return ", ".join(filter(None, (path.name, f"line {line}" if line else "", dotted)))
 
 
 def _names(dotted: str) -> list[str]:

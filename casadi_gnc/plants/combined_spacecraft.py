@@ -51,12 +51,12 @@ class CombinedSpacecraft:
 
     @property
     def state(self) -> Layout:
-        """mrp and rate."""
+        """Mrp and rate."""
         return Layout((Signal("mrp", 3, "-", FRAME), Signal("rate", 3, "rad/s", FRAME)))
 
     @property
     def measurement(self) -> Layout:
-        """mrp and rate, each with the largest magnitude that can be true."""
+        """Mrp and rate, each with the largest magnitude that can be true."""
         return Layout(
             (Signal("mrp", 3, "-", FRAME, limit=2.0), Signal("rate", 3, "rad/s", FRAME, limit=self.rate_limit))
         )

@@ -12,7 +12,9 @@ import casadi_gnc
 
 ROOT = Path(casadi_gnc.__file__).parent
 FLOORS = {
-    **dict.fromkeys(("errors", "status", "exact", "assets", "signals", "bounds", "attitude", "rigid_body", "thrusters"), 0),
+    **dict.fromkeys(
+        ("errors", "status", "exact", "assets", "signals", "bounds", "attitude", "rigid_body", "thrusters"), 0
+    ),
     **dict.fromkeys(("plants", "laws", "allocation", "synthesis"), 1),
     "embedded": 2,
     "missions": 3,
@@ -46,7 +48,9 @@ def test_imports_go_down(path):
     for other in imported_rooms(path):
         assert other in FLOORS, f"{other} has no floor"
         # Rooms of one floor above the ground do not import each other.
-        assert other == own or FLOORS[other] < FLOORS[own] or FLOORS[own] == 0 == FLOORS[other], f"{own} imports {other}"
+        assert other == own or FLOORS[other] < FLOORS[own] or FLOORS[own] == 0 == FLOORS[other], (
+            f"{own} imports {other}"
+        )
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())

@@ -85,7 +85,9 @@ def test_everything_is_symbolic_and_differentiable_by_every_gain(name):
     tuned = law(body=BODY, hold=0.1, **needs, **symbols)
     y, m = ca.SX.sym("y", tuned.inputs.size), tuned.memory.symbol("m")
     wanted = tuned.command(0.0, y, m)
-    gradient = ca.jacobian(ca.vertcat(wanted, advance(tuned, 0.0, y, m, wanted, wanted / 2)), ca.vertcat(*symbols.values()))
+    gradient = ca.jacobian(
+        ca.vertcat(wanted, advance(tuned, 0.0, y, m, wanted, wanted / 2)), ca.vertcat(*symbols.values())
+    )
     evaluate = ca.Function("gradient", [y, m, *symbols.values()], [gradient])
     at = evaluate(np.full(tuned.inputs.size, 0.01), np.full(tuned.memory.size, 0.01), *[0.4] * len(symbols))
     assert np.all(np.isfinite(np.array(at)))

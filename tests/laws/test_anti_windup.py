@@ -23,7 +23,9 @@ def saturated_slope(law) -> float:
 
 @pytest.mark.parametrize("name", ["detumble", "prescribed_performance"])
 def test_corrected_sign_is_stable_and_printed_sign_runs_away(name):
-    funnel = PerformanceFunnel(ca.DM([1.0] * 3), ca.DM([1e-3] * 3), ca.DM([0.1] * 3), ca.DM([1.0] * 3), ca.DM([1.0] * 3))
+    funnel = PerformanceFunnel(
+        ca.DM([1.0] * 3), ca.DM([1e-3] * 3), ca.DM([0.1] * 3), ca.DM([1.0] * 3), ca.DM([1.0] * 3)
+    )
     extra = {"funnel": funnel, "attitude_gain": 0.1, "filter_time_constant": 1.0} if name != "detumble" else {}
     law = LAWS[name](body=BODY, **GAINS, **extra)
     assert isinstance(law, (Detumble, PrescribedPerformance))

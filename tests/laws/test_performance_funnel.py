@@ -8,7 +8,11 @@ from casadi_gnc.laws import PerformanceFunnel
 from casadi_gnc.laws.performance_funnel import GUARD
 
 FUNNEL = PerformanceFunnel(
-    ca.DM([0.25, 0.28, 0.095]), ca.DM([3e-5, 1.4e-5, 5e-5]), ca.DM([0.025, 0.03, 0.02]), ca.DM([1, 1, 0.2]), ca.DM([0.1, 0.1, 1])
+    ca.DM([0.25, 0.28, 0.095]),
+    ca.DM([3e-5, 1.4e-5, 5e-5]),
+    ca.DM([0.025, 0.03, 0.02]),
+    ca.DM([1, 1, 0.2]),
+    ca.DM([0.1, 0.1, 1]),
 )
 
 

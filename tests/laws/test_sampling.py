@@ -55,7 +55,9 @@ def test_what_is_not_affine_does_not_spoil_what_is():
     """beta h = 4 would blow up a Runge-Kutta step; the affine lag stays exact beside the cubic."""
     law, m = Mixed(hold=0.1), np.array([1.0, 0.5, 0.2])
     found = advanced(law, m, 0.3)
-    truth = solve_ivp(lambda t, s: [-40 * s[0] + 0.3, -s[1] ** 3 + 0.3, -s[2] + s[1]], (0, 0.1), m, rtol=1e-12, atol=1e-14)
+    truth = solve_ivp(
+        lambda t, s: [-40 * s[0] + 0.3, -(s[1] ** 3) + 0.3, -s[2] + s[1]], (0, 0.1), m, rtol=1e-12, atol=1e-14
+    )
     assert found[0] == pytest.approx(truth.y[0, -1], abs=1e-11)
     # One RK4 step of 0.1 s: the local error is of order h^5.
     assert np.allclose(found[1:], truth.y[1:, -1], atol=1e-7)

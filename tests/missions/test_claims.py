@@ -1,0 +1,105 @@
+"""The numbers of Huang, Biggs, Duan (2020) as re-derived, and an oracle written by hand."""
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import casadi_gnc
+from casadi_gnc.missions.building import build
+from casadi_gnc.missions.loading import read
+from casadi_gnc.missions.schema import MissionModel
+from casadi_gnc.status import StepStatus
+
+_spec = importlib.util.spec_from_file_location(
+    "detumble_numpy", Path(__file__).parents[1] / "oracles" / "detumble_numpy.py"
+)
+oracle = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(oracle)
+
+
+@pytest.mark.parametrize("feedback", ["wanted", "achieved"])
+def test_flight_is_the_hand_written_one(detumble, feedback):
+    """The tumble amplifies rounding some 1e4 times in 60 s; 1e-11 rad/s leaves room for that."""
+    flight = casadi_gnc.fly(detumble.with_scheme("observer_pinv", feedback=feedback).with_timing(duration=60.0))
+    by_hand = oracle.fly(601, feedback=feedback)
+    for name in ("rate", "force", "achieved"):
+        assert np.allclose(flight[name], by_hand[name], rtol=0, atol=1e-11), name
+
+
+def test_settled_flight_is_the_hand_written_one(detumble):
+    flight = casadi_gnc.fly(detumble, "observer_pinv")
+    by_hand = oracle.fly(15001)
+    assert np.allclose(flight["rate"][-1000:], by_hand["rate"][-1000:], atol=1e-9)
+    total = np.linalg.norm(by_hand["achieved"], axis=1).sum()
+    assert flight.metrics["torque_sample_sum"] == pytest.approx(total, rel=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["sampled", "continuous"])
+def test_damping_and_pseudo_inverse(detumble, mode):
+    """Sheet (a): sample sums 13.24 N m and 62.1 N, steady rate 2.8e-3 .. 3.0e-3 rad/s, never settled."""
+    flight = casadi_gnc.fly(detumble, "damping_pinv", mode=mode)
+    assert flight.metrics["torque_sample_sum"] == pytest.approx(13.24, rel=0.01)
+    assert flight.metrics["force_sample_sum"] == pytest.approx(62.1, rel=0.01)
+    assert 2.6e-3 < flight.metrics["steady_rate"] < 3.1e-3
+    assert flight.metrics["settling_time"] is None
+
+
+@pytest.mark.parametrize(("beta", "k4", "torque"), [(27.0, 0.5, 13.712), (0.5, 27.0, 13.612)])
+def test_observer_and_pseudo_inverse(detumble, beta, k4, torque):
+    """Sheet (a): 13.612 as printed, 13.712 with k4 and beta exchanged; settled at 968 .. 970 s."""
+    mission = detumble.with_scheme("observer_pinv", observer_gain=beta, compensator_decay=k4)
+    flight = casadi_gnc.fly(mission, mode="continuous")
+    assert flight.metrics["torque_sample_sum"] == pytest.approx(torque, rel=0.01)
+    assert flight.metrics["settling_time"] == pytest.approx(968, abs=5)
+
+
+def test_observer_told_of_the_achieved_torque_does_not_settle(detumble):
+    """Design note: with the truth about what the clipped pseudo-inverse makes, 13.3 and no settling."""
+    flight = casadi_gnc.fly(detumble.with_scheme("observer_pinv", feedback="achieved"))
+    assert flight.metrics["settling_time"] is None
+    assert flight.metrics["torque_sample_sum"] == pytest.approx(13.3, rel=0.01)
+    assert any("settling_time: never" in note for note in flight.notes)
+    assert flight.summary()["metrics"]["settling_time"]["value"] is None
+
+
+def test_robust_allocation_against_five_centimetres():
+    """Printed 800 s; saturated tumbling is sensitive, so 780 .. 825 s and no tighter."""
+    path, text, data = read("huang2020/detumble")
+    data["scheme"] = [scheme for scheme in data["scheme"] if scheme["name"] == "observer_robust"]
+    data["scheme"][0]["allocation"]["centre_of_mass_error_m"] = [0.05, 0.05, 0.05]
+    flight = casadi_gnc.fly(build(MissionModel.model_validate(data), path, text))
+    assert 780 <= flight.metrics["settling_time"] <= 825
+    assert flight.metrics["steady_rate"] < 5e-6
+    assert flight.metrics["torque_sample_sum"] == pytest.approx(15.34, rel=0.02)
+
+
+def test_default_slew_stays_in_its_funnel():
+    """1000 s, sampled, on the real thrusters with robust allocation; floors of 5e-5."""
+    mission = casadi_gnc.load("huang2020/slew")
+    flight = casadi_gnc.fly(mission, "funnel_robust")
+    assert flight.metrics["funnel_use"] < 0.75
+    assert StepStatus.FUNNEL_LEFT not in flight.statuses
+    assert flight.time[-1] == pytest.approx(1000)
+    assert np.all(flight["mrp"] > flight["funnel_lower"])
+    assert np.all(flight["mrp"] < flight["funnel_upper"])
+    floor = np.array(mission.funnel.bounds.floor).ravel()
+    assert np.all(floor >= 5e-5)
+    # Without the limiters the same funnel is left.
+    unlimited = casadi_gnc.fly(mission.with_scheme("funnel_robust", max_acceleration=None).with_timing(duration=60.0))
+    assert StepStatus.FUNNEL_LEFT in unlimited.statuses
+
+
+@pytest.mark.parametrize(("scheme", "left"), [("pd_pinv", 20.5), ("funnel_pinv", 20.3)])
+def test_printed_slew_leaves_its_funnel(scheme, left):
+    """Sheet (a): as printed, at 20.3 s; PD at 20.5 s."""
+    flight = casadi_gnc.fly(casadi_gnc.load("huang2020/slew_as_printed"), scheme)
+    assert flight.statuses[StepStatus.FUNNEL_LEFT][1] == pytest.approx(left, abs=0.15)
+
+
+def test_chaser_model_is_worse(detumble):
+    """Section 5.3: without the rebuilt model the pseudo-inverse schemes do not come to rest."""
+    flight = casadi_gnc.fly(casadi_gnc.load("huang2020/detumble_chaser_model"), "observer_pinv")
+    assert flight.metrics["settling_time"] is None
+    assert np.abs(flight["rate"][-1000:]).max() > 5e-3

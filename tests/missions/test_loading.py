@@ -1,0 +1,120 @@
+"""Bad input: one clear sentence with file, line and key, and never a traceback of another kind."""
+
+import re
+
+import pytest
+
+import casadi_gnc
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.missions import toml_place
+from casadi_gnc.missions.loading import read, shipped
+
+_, GOOD, _ = read("huang2020/detumble")
+_, SLEW, _ = read("huang2020/slew")
+INERTIA = "[[0.49019, 0.0, 0.0], [0.0, 1.2089, 0.0], [0.0, 0.0, 1.2916]]"
+ANGLES = "rotation_321_rad = [0.7853981633974483, 0.4487989505128276, 1.0471975511965976] # pi/4, pi/7, pi/3"
+PRINTED = "rotation = [[0.63708, 0.63708, -0.43388], [-0.87855, 0.61925, 0.78026], [0.76577, -0.45897, 0.45048]]"
+
+CASES = {
+    "unknown key": (GOOD, "max_force_N", "max_forse_N", r"line \d+, spacecraft.thrusters.*max_forse_N|is missing"),
+    "unknown top key": (GOOD, 'kind = "mission"', 'kind = "mission"\nmood = 1', r"line \d+, mood: unknown key"),
+    "unknown gain": (GOOD, "observer_gain = 27.0", "observer_gian = 27.0", "scheme.2..law.*(observer_gain: is missing|observer_gian)"),
+    "wrong shape": (GOOD, "centre_of_mass_m = [0.05, 0.05, 0.05]", "centre_of_mass_m = [0.05, 0.05]", "line LINE, spacecraft.centre_of_mass_m: list should have at least 3 items"),
+    "inertia not spd": (GOOD, INERTIA, INERTIA.replace("1.2916", "-1.2916"), "line LINE, spacecraft.inertia_kg_m2: not positive definite: its smallest principal moment is -1.29"),
+    "inertia not symmetric": (GOOD, INERTIA, INERTIA.replace("[0.49019, 0.0,", "[0.49019, 0.1,"), "not symmetric: .* up to 0.1 kg"),
+    "inertia of no body": (GOOD, INERTIA, INERTIA.replace("1.2916", "3.2916"), "no body has these principal moments"),
+    "the paper's rotation": (GOOD, ANGLES, PRINTED, r"line LINE, spacecraft.rotation: no rotation: the largest entry of R R' - I is 0.76, .*row 2 has length 1.328"),
+    "reflection": (GOOD, ANGLES, "rotation = [[1,0,0],[0,1,0],[0,0,-1]]", "a reflection"),
+    "two rotations": (GOOD, ANGLES, ANGLES + "\nrotation = [[1,0,0],[0,1,0],[0,0,1]]", "both given; keep one"),
+    "negative bound": (GOOD, "max_force_N = 3.75e-3", "max_force_N = -1.0", "line LINE, spacecraft.thrusters.max_force_N: .*greater than 0, got -1.0"),
+    "crossed bounds": (GOOD, "max_force_N = 3.75e-3", "max_force_N = 3.75e-3\nmin_force_N = 1.0", "min_force_N 1.0 exceeds max_force_N"),
+    "not a number": (GOOD, "rate_rad_per_s = [0.45, 0.52, 0.55]", "rate_rad_per_s = [nan, 0.52, 0.55]", r"initial.rate_rad_per_s\[1\]: .*finite number"),
+    "infinite": (GOOD, "duration_s = 1500.0", "duration_s = inf", "timing.duration_s: .*finite number"),
+    "direction": (GOOD, "[0, 1, 0], [-1, 0, 0], [0, 0, 1],", "[0, 1, 0], [-1, 1, 0], [0, 0, 1],", "thruster 2: a direction of length 1.414"),
+    "count": (GOOD, "  [0, 0, 1], [0, -1, 0], [1, 0, 0],\n", "", "12 positions but 9 directions"),
+    "broken samples": (GOOD, "sample_period_s = 0.1", "sample_period_s = 0.7", "expected a whole number"),
+    "wrong kind": (GOOD, 'kind = "mission"', 'kind = "voyage"', "kind is 'voyage'; only a file of kind \"mission\""),
+    "no toml": (GOOD, "[truth]", "[truth", "is not valid TOML"),
+    "unknown law": (GOOD, 'type = "rate_damping"', 'type = "magic"', "scheme.1..law.*rate_damping"),
+    "negative gain": (GOOD, "rate_gain = 0.4 }", "rate_gain = -0.4 }", r"scheme\[1\].law.rate_gain: .*greater than 0, got -0.4"),
+    "unknown erratum": (GOOD, 'feedback = "wanted"', 'feedback = "wanted"\nas_printed = ["typo"]', "detumble has no erratum 'typo'; known: anti_windup_sign"),
+    "unknown signal": (GOOD, 'signal = "force"', 'signal = "forces"', r"metric\[4\].signal: 'forces' is no signal of scheme damping_pinv; there is time, mrp"),
+    "same name": (GOOD, 'name = "observer_pinv"', 'name = "damping_pinv"', "the name 'damping_pinv' is given twice"),
+    "name for a shell": (GOOD, 'name = "observer_pinv"', 'name = "a; rm -rf b"', r"scheme\[2\].name: string should match"),
+    "start outside funnel": (SLEW, "start = [0.40, 0.35, 0.15]", "start = [0.10, 0.35, 0.15]", "axis 1 starts at -0.206, outside its funnel from -0.1 to 0.01"),
+    "inverted funnel": (SLEW, "floor = [5e-5, 5e-5, 5e-5]", "floor = [5e-5, 1, 5e-5]", "axis 2: floor 1 is wider than start 0.35"),
+    "no funnel": (SLEW, SLEW[SLEW.index("[funnel]") : SLEW.index("[timing]")], "", r"scheme\[2\].law: the law 'prescribed_performance' needs a \[funnel\]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_bad_file_is_told_in_one_sentence(case, tmp_path):
+    text, old, new, message = CASES[case]
+    assert old in text
+    path = tmp_path / "bad.toml"
+    path.write_text(text.replace(old, new, 1))
+    line = text[: text.index(old)].count("\n") + 1
+    with pytest.raises(ProblemError) as caught:
+        casadi_gnc.load(path)
+    told = str(caught.value)
+    assert re.search(message.replace("LINE", str(line)), told), told
+    assert told.startswith("bad.toml")
+    assert "\n" not in told
+    assert len(told) < 400
+
+
+def test_unknown_key_names_the_near_one(tmp_path):
+    path = tmp_path / "bad.toml"
+    path.write_text(GOOD.replace("duration_s = 1500.0", "duration_s = 1500.0\nduration = 3"))
+    with pytest.raises(ProblemError, match=r"line \d+, timing.duration: unknown key; did you mean duration_s\?"):
+        casadi_gnc.load(path)
+
+
+def test_missing_file_names_the_near_one():
+    with pytest.raises(ProblemError, match='did you mean "huang2020/detumble"'):
+        casadi_gnc.load("huang2020/detumbel")
+    with pytest.raises(ProblemError, match="no problem file 'nowhere.toml'"):
+        casadi_gnc.load("nowhere.toml")
+
+
+def test_binary_file_is_told(tmp_path):
+    path = tmp_path / "binary.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ProblemError, match="cannot be read as UTF-8"):
+        casadi_gnc.load(path)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_shipped_problems_load(name):
+    mission = casadi_gnc.load(name)
+    assert mission.title
+    assert "doi" in mission.source
+    assert len(mission.schemes) >= 3
+
+
+def test_places_of_keys():
+    places = toml_place.lines_of(GOOD)
+    lines = GOOD.splitlines()
+    assert lines[places["scheme", 1, "feedback"] - 1] == 'feedback = "wanted"'
+    assert lines[places["scheme", 2, "law", "type"] - 1] == 'type = "detumble"'
+    assert lines[places["metric", 3, "signal"] - 1] == 'signal = "force"'
+    assert lines[places["environment", "harmonic", 1] - 1] == "[[environment.harmonic]]"
+
+
+def test_composed_inertia_and_tables_of_parts(tmp_path):
+    """A file may compose the inertia from parts (eq. 70) instead of giving it."""
+    parts = "".join(
+        f"[[spacecraft.part]]\nmass_kg = 10.0\ninertia_kg_m2 = [[0.2666,0,0],[0,0.26,0],[0,0,0.1666]]\n"
+        f"position_m = [{x}, 0.0, 0.0]\n{ANGLES}\n"
+        for x in (-0.2, 0.2)
+    )
+    text = GOOD.replace(f"inertia_kg_m2 = {INERTIA}\n", "", 1).replace(
+        "[spacecraft.orbit_engine]", parts + "[spacecraft.orbit_engine]"
+    )
+    path = tmp_path / "parts.toml"
+    path.write_text(text)
+    inertia = casadi_gnc.load(path).scheme().law.body.inertia
+    assert float(inertia[0, 0]) == pytest.approx(0.490189, abs=1e-5)  # the sheet's value without links
+    path.write_text(GOOD.replace("[spacecraft.orbit_engine]", parts + "[spacecraft.orbit_engine]"))
+    with pytest.raises(ProblemError, match="either inertia_kg_m2 or one or more"):
+        casadi_gnc.load(path)
