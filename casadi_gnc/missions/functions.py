@@ -6,6 +6,7 @@ or optimised here is what flies.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -23,14 +24,20 @@ def plant_rate(mission: Mission) -> ca.Function:
     return tapes.function("plant", {"t": t, "x": x, "force": force}, {"rate": plant.rate(t, x, force)})
 
 
-def law_function(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, y, m, achieved) -> (wanted, memory_rate, shown signals...)."""
+def law_function(mission: Mission, scheme: Scheme, parameters: Sequence[ca.SX] = ()) -> ca.Function:
+    """Return (t, y, m, achieved, [p]) -> (wanted, memory_rate, shown signals...)."""
     s, law = tapes.Symbols(mission, scheme), scheme.law
     seen = tapes.law_inputs(mission, scheme, s.y)
     told = ca.SX.sym("achieved", scheme.actuation.effectiveness.shape[0])
     wanted = law.command(s.t, seen, s.m)
     outputs = {"wanted": wanted, "memory_rate": law.rate(s.t, seen, s.m, wanted, told), **law.show(s.t, seen, s.m)}
-    return tapes.function("law", {"t": s.t, "y": s.y, "m": s.m, "achieved": told}, outputs)
+    return _function("law", {"t": s.t, "y": s.y, "m": s.m, "achieved": told}, outputs, parameters)
+
+
+def _function(name: str, ports: dict[str, Any], outputs: dict[str, Any], parameters: Sequence[ca.SX]) -> ca.Function:
+    if parameters:
+        ports = {**ports, "p": ca.vertcat(*parameters)}
+    return tapes.function(name, ports, outputs)
 
 
 def _controller(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
@@ -50,17 +57,17 @@ def _controller(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
     return {**first, "force": force, "memory_next": memory}
 
 
-def step_function(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, y, good, m, force) -> (force_next, m_next, good_next, wanted, limited, status)."""
+def step_function(mission: Mission, scheme: Scheme, parameters: Sequence[ca.SX] = ()) -> ca.Function:
+    """Return (t, y, good, m, force, [p]) -> (force_next, m_next, good_next, wanted, limited, status)."""
     s = tapes.Symbols(mission, scheme)
     c = _controller(mission, scheme, s)
     outputs = {"force_next": c["force"], "m_next": c["memory_next"], "good_next": c["accepted"]}
     outputs.update(wanted=c["wanted"], limited=c["limited"], status=c["flags"])
-    return tapes.function("step", {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "force": s.force}, outputs)
+    return _function("step", {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "force": s.force}, outputs, parameters)
 
 
-def closed_loop_function(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, x, m, force, good) -> (x_next, m_next, force_next, good_next, wanted, limited)."""
+def closed_loop_function(mission: Mission, scheme: Scheme, parameters: Sequence[ca.SX] = ()) -> ca.Function:
+    """Return (t, x, m, force, good, [p]) -> (x_next, m_next, force_next, good_next, wanted, limited)."""
     s = tapes.Symbols(mission, scheme)
     ports = {"t": s.t, "x": s.x, "m": s.m, "force": s.force, "good": s.good}
     s.y = mission.truth.measure(s.t, s.x)
@@ -70,4 +77,4 @@ def closed_loop_function(mission: Mission, scheme: Scheme) -> ca.Function:
         x = tapes.runge_kutta(lambda t, at: mission.truth.rate(t, at, c["force"]), s.t + i * h, x, h)
     outputs = {"x_next": mission.truth.settle(x), "m_next": c["memory_next"], "force_next": c["force"]}
     outputs.update(good_next=c["accepted"], wanted=c["wanted"], limited=c["limited"])
-    return tapes.function("closed_loop", ports, outputs)
+    return _function("closed_loop", ports, outputs, parameters)

@@ -43,8 +43,10 @@ def fold(metrics: tuple[Metric, ...], row: Layout) -> tuple[Layout, ca.Function]
         metric.name: _next(metric, getattr(now, metric.signal), now.time, getattr(so_far, metric.name))
         for metric in metrics
     }
-    for bit in StepStatus:
-        raised = ca.fmod(ca.floor(now.status / bit.value), 2)
+    rest = now.status
+    for bit in StepStatus:  # in the order of the bits, each the parity of what the lower ones left
+        half = ca.floor(rest / 2)
+        raised, rest = rest - 2 * half, half
         count, first = getattr(so_far, f"count_{bit.name}"), getattr(so_far, f"first_{bit.name}")
         parts[f"count_{bit.name}"] = count + raised
         parts[f"first_{bit.name}"] = ca.if_else(ca.logic_and(raised, first < 0), now.time, first)

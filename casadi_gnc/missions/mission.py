@@ -4,6 +4,7 @@ schemes that could fly it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
@@ -161,20 +162,24 @@ class Mission:
 
         return functions.plant_rate(self)
 
-    def law(self, scheme: str | None = None) -> ca.Function:
-        """Return the law as (t, y, m, achieved) -> (wanted, rate of memory, shown signals)."""
+    def law(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
+        """Return the law as (t, y, m, achieved, [p]) -> (wanted, rate of memory, shown signals).
+
+        `parameters` are symbols that were put in place of gains by `with_scheme`; where there are
+        any, the function has them as its last port, p.
+        """
         from casadi_gnc.missions import functions
 
-        return functions.law_function(self, self.scheme(scheme))
+        return functions.law_function(self, self.scheme(scheme), parameters)
 
-    def step(self, scheme: str | None = None) -> ca.Function:
-        """Return one sample of the controller: (t, y, good, m, force) -> (force, m, ...)."""
+    def step(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
+        """Return one sample of the controller: (t, y, good, m, force, [p]) -> (force_next, m_next, ...)."""
         from casadi_gnc.missions import functions
 
-        return functions.step_function(self, self.scheme(scheme))
+        return functions.step_function(self, self.scheme(scheme), parameters)
 
-    def closed_loop(self, scheme: str | None = None) -> ca.Function:
-        """Return one sample period of the whole loop: (t, x, m, force, good) -> the same, later."""
+    def closed_loop(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
+        """Return one sample period of the loop: (t, x, m, force, good, [p]) -> the same, later."""
         from casadi_gnc.missions import functions
 
-        return functions.closed_loop_function(self, self.scheme(scheme))
+        return functions.closed_loop_function(self, self.scheme(scheme), parameters)

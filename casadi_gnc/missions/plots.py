@@ -41,22 +41,24 @@ def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
 
 
 def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -> Path:
-    """Draw the largest rate of every flight on one logarithmic axis; return the path."""
-    figure, (axes,) = _figure(1, height=4.4)
+    """Draw all flights on one logarithmic axis and return the path of the picture.
+
+    Drawn is the share of the funnel that was used, or the largest rate where there is no funnel.
+    """
+    figure, (axes,) = _figure(1, height=4.8)
+    funnel = mission.funnel is not None
     for colour, flight in zip(COLOURS, flights, strict=False):
-        size = np.maximum(np.abs(flight["rate"]).max(axis=1), 1e-9)
-        axes.semilogy(*_thin(flight.time, size), color=colour, label=flight.title, linewidth=1.8)
-    for metric in mission.metrics:
-        if metric.kind == "settling" and metric.signal == "rate":
-            axes.axhline(metric.threshold, color="0.4", linestyle="--", linewidth=1)
-            axes.annotate(
-                f"settled below {metric.threshold:g} rad/s", (0.01, metric.threshold), color="0.3",
-                xycoords=("axes fraction", "data"), va="top", fontsize=_FONT - 1,
-            )  # fmt: skip
-    axes.set_ylabel("largest |rate| [rad/s]")
+        size = flight["funnel_use"] if funnel else np.abs(flight["rate"]).max(axis=1)
+        axes.semilogy(*_thin(flight.time, np.maximum(size, 1e-9)), color=colour, label=flight.title, linewidth=1.8)
+    thresholds = [m.threshold for m in mission.metrics if m.kind == "settling" and m.signal == "rate"]
+    for level, text in (
+        [(1.0, "wall of the funnel")] if funnel else [(t, f"settled below {t:g} rad/s") for t in thresholds]
+    ):
+        axes.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=text)
+    axes.set_ylabel("share of the funnel used [-]" if funnel else "largest |rate| [rad/s]")
     axes.set_xlabel("time [s]")
-    axes.set_title(mission.title, fontsize=_FONT + 1)
-    axes.legend(loc="lower left", fontsize=_FONT - 1, frameon=False)
+    axes.set_title(mission.title, fontsize=_FONT + 1, loc="left")
+    figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)
     return _save(figure, folder / "comparison.png")
 
 
@@ -154,8 +156,10 @@ def _forces(axes: Any, mission: Mission, flight: Flight) -> None:
         vmin=min(actuation.lower) * 1e3, vmax=max(actuation.upper) * 1e3,
     )  # fmt: skip
     axes.grid(visible=False)
-    axes.set_ylabel("thruster")
-    axes.figure.colorbar(image, ax=axes, label="force [mN]", pad=0.01)
+    axes.set_ylabel("force, thruster no.")
+    bar = axes.figure.colorbar(image, ax=axes, pad=0.01)
+    bar.ax.set_title("mN", fontsize=_FONT - 1)
+    bar.ax.tick_params(labelsize=_FONT - 2)
 
 
 def _save(figure: Any, target: Path) -> Path:
