@@ -1,7 +1,29 @@
-"""Control allocation: which actuator does what, exactly and with a certificate."""
+"""Control allocation: which actuator does what, exactly and with a certificate.
 
-from casadi_gnc.allocation.clarabel_ import ConeAllocator
-from casadi_gnc.allocation.pinv_ import PseudoInverse, pseudo_inverse
+>>> import numpy as np
+>>> from casadi_gnc import allocation
+>>> problem = allocation.AllocationProblem(np.array([[1.0, -1.0]]), lower=0.0, upper=2.0)
+>>> answer = allocation.solve(problem, command=[1.0])
+>>> answer.status.name, answer.forces.round(5).tolist()
+('OPTIMAL', [1.0, 0.0])
+"""
+
+from casadi_gnc.allocation.allocator import Allocator, solve
+from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, Saturation, best_weights, certify
+from casadi_gnc.allocation.in_flight import PseudoInverse, SolverInFlight, pseudo_inverse
 from casadi_gnc.allocation.problem import AllocationProblem
 
-__all__ = ["AllocationProblem", "ConeAllocator", "PseudoInverse", "pseudo_inverse"]
+__all__ = [
+    "ACCURACIES",
+    "AllocationProblem",
+    "AllocationStatus",
+    "Allocator",
+    "Answer",
+    "PseudoInverse",
+    "Saturation",
+    "SolverInFlight",
+    "best_weights",
+    "certify",
+    "pseudo_inverse",
+    "solve",
+]

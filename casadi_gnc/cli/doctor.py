@@ -41,6 +41,7 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] 
 
 def examine() -> dict[str, Any]:
     """Return what the doctor finds, as plain data."""
+    from casadi_gnc.allocation import backends
     from casadi_gnc.embedded import compilers
 
     packages, missing = {}, []
@@ -51,7 +52,7 @@ def examine() -> dict[str, Any]:
             missing.append({"what": name, "cost": f"a required package; pip install {name}"})
     for name, module, extra, gives in _EXTRAS:
         if util.find_spec(module) is None:
-            missing.append({"what": name, "cost": f'no {gives}; pip install "casadi-gnc[{extra}]"'})
+            missing.append({"what": name, "cost": f'without it you lack {gives}; pip install "casadi-gnc[{extra}]"'})
         else:
             packages[name] = metadata.version(name)
     found = compilers.available()
@@ -67,15 +68,7 @@ def examine() -> dict[str, Any]:
         "platform": platform.platform(),
         "packages": packages,
         "compilers": [{"command": " ".join(c.command), "version": c.version} for c in found],
-        "solvers": _solvers(),
+        "solvers": backends.available(),
         "cache": {"folder": str(folder), "libraries": libraries},
         "missing": missing,
     }
-
-
-def _solvers() -> list[str]:
-    """Return the allocation back ends that can be used here."""
-    found = ["pinv"]
-    if util.find_spec("clarabel") is not None:
-        found.append("clarabel")
-    return found

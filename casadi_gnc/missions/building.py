@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc import attitude
-from casadi_gnc.allocation import AllocationProblem, ConeAllocator, PseudoInverse
+from casadi_gnc.allocation import AllocationProblem, Allocator, PseudoInverse, SolverInFlight
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import LAWS, PerformanceFunnel, gains_of
 from casadi_gnc.missions import schema, tapes
@@ -19,7 +19,7 @@ from casadi_gnc.missions.mission import Actuation, Funnel, Metric, Mission, Sche
 from casadi_gnc.missions.toml_place import describe
 from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
 from casadi_gnc.rigid_body import RigidBody
-from casadi_gnc.thrusters import ThrusterGeometry, corner_errors
+from casadi_gnc.thrusters import ThrusterGeometry
 
 
 def _orientation(model: schema.Orientation) -> ca.DM | None:
@@ -189,27 +189,26 @@ def _scheme(
         rate=thrusters.max_force_rate_N_per_s or float("inf"),
         limit_below=[-value for value in limit],
         limit_above=limit,
-        allocator=_allocator(model.allocation, thrusters, thought),
+        allocator=_allocator(model.allocation, thrusters, thought, timing),
     )
     return Scheme(
         model.name, law(body=body, hold=hold, printed=frozenset(named), **gains), actuation, model.feedback, model.title
     )
 
 
-def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft) -> Any:
-    effectiveness = thought.thrusters.effectiveness
+def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft, timing: Timing) -> Any:
     if isinstance(model, schema.PinvModel):
-        return PseudoInverse(effectiveness)
+        return PseudoInverse(thought.thrusters.effectiveness)
     half = model.centre_of_mass_error_m
-    count = thought.thrusters.count
-    problem = AllocationProblem(
-        effectiveness=np.array(effectiveness),
-        lower=np.full(count, thrusters.min_force_N),
-        upper=np.full(count, thrusters.max_force_N),
-        coupling=np.array(thought.thrusters.directions),
-        errors=corner_errors(thought.rotation, [-value for value in half], list(half)),
-        effort_weight=np.full(count, model.effort_weight),
-        change_weight=np.full(count, model.change_weight),
+    problem = AllocationProblem.of_thrusters(
+        thought.thrusters,
+        thought.rotation,
+        ([-value for value in half], half),
+        lower=thrusters.min_force_N,
+        upper=thrusters.max_force_N,
+        max_step=(thrusters.max_force_rate_N_per_s or np.inf) * timing.sample_period,
+        effort_weight=model.effort_weight,
+        change_weight=model.change_weight,
         accuracy_weight=model.accuracy_weight,
     )
-    return ConeAllocator(problem)
+    return SolverInFlight(Allocator(problem, model.backend))

@@ -97,9 +97,7 @@ def main() -> None:
         assert np.allclose(end, ends["our C, gnc_math"], atol=1e-7), name
     seconds = {name: shortest(run, times) for name, (run, times) in peers.items()}
     ours = seconds["our C, gnc_math"]
-    print(
-        f"{SAMPLES} samples of {MISSION.name}, {SCHEME}; {compilers.find().version}; {platform.processor() or platform.machine()}"
-    )
+    print(f"{SAMPLES} samples of {MISSION.name}, {SCHEME}; {compilers.find().version}; {platform.machine()}")
     for name, value in seconds.items():
         print(f"{name:<22}{value * 1e3:10.2f} ms{value / SAMPLES * 1e6:10.3f} us a sample{value / ours:10.1f} x ours")
     start_up = help_seconds()

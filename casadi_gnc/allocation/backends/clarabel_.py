@@ -15,22 +15,15 @@ from typing import Any
 
 import numpy as np
 
+from casadi_gnc.allocation.backends import Capability, Found
 from casadi_gnc.allocation.problem import AllocationProblem
-from casadi_gnc.signals import Layout, Signal
-from casadi_gnc.status import StepStatus
 
-#: Duality gap, relative to the cost, above which an answer is reported as inexact.
-TOLERANCE = 1e-6
-#: Gap allowed whatever the cost, as a share of h |full effort|^2: 1e-5 of the effort, squared.
-ROUNDING_FLOOR = 1e-10
+CAPABILITIES = Capability.ROBUST | Capability.EXACT | Capability.SOCP
+REQUIRES = ("clarabel",)
 
 
-class ConeAllocator:
-    """Solve one allocation a sample; every answer is clipped into its box and certified."""
-
-    report = Layout((Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations")))
-
-    def __init__(self, problem: AllocationProblem) -> None:
+class _Cone:
+    def __init__(self, problem: AllocationProblem, tolerance: float) -> None:
         self.problem = problem
         reach = np.maximum(np.abs(problem.lower), np.abs(problem.upper))
         self._reach = np.where(reach > 0, reach, 1.0)
@@ -40,9 +33,9 @@ class ConeAllocator:
         self._effort = 1e-2 * self._full
         self._cost = 2 * problem.accuracy_weight * self._effort**2
         self._quadratic = 2 * (problem.effort_weight + problem.change_weight) * self._reach**2 / self._cost
-        self._solver = self._set_up(len(self._reach))
+        self._solver = self._set_up(len(self._reach), tolerance)
 
-    def _set_up(self, count: int) -> Any:
+    def _set_up(self, count: int, tolerance: float) -> Any:
         from importlib import import_module
 
         from scipy import sparse
@@ -59,41 +52,38 @@ class ConeAllocator:
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.presolve_enable = False
-        settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = 1e-12, 1e-9, 1e-9
+        settings.tol_gap_rel = settings.tol_feas = tolerance
+        settings.tol_gap_abs = 1e-3 * tolerance
         quadratic = sparse.csc_matrix(np.diag(np.append(self._quadratic, 0.0)))
         lhs = sparse.csc_matrix(np.vstack(blocks))
         self._rhs = np.zeros(sum(len(block) for block in blocks))
         return clarabel.DefaultSolver(quadratic, np.zeros(count + 1), lhs, self._rhs, cones, settings)
 
-    def solve(
-        self, command: np.ndarray, previous: np.ndarray, lower: np.ndarray, upper: np.ndarray
-    ) -> tuple[np.ndarray, StepStatus, np.ndarray]:
-        """Return forces (N,) inside the box, status bits, and the numbers of `report`.
-
-        A failed solve keeps the previous forces, moved into the box.
-        """
+    def find(self, command: np.ndarray, previous: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Found:
+        """Return Clarabel's forces and the vertex weights from its multipliers."""
         problem, count = self.problem, len(lower)
         rows, vertices = len(command), len(problem.vertices)
         # Forces in units of what the command needs: a small command is as well scaled as a large one.
         share = max(np.linalg.norm(command) / self._full, float(np.max(np.abs(lower) / self._reach)), 0.1)
         unit = share * self._reach
-        linear = np.append(-2 * problem.change_weight * previous * self._reach / (self._cost * share), 1.0)
+        pull = problem.effort_weight * problem.preferred + problem.change_weight * previous
+        linear = np.append(-2 * pull * self._reach / (self._cost * share), 1.0)
         rhs = self._rhs
         rhs[:count], rhs[count : 2 * count] = upper / unit, -lower / unit
         cone = rhs[2 * count :].reshape(vertices, rows + 2)
         cone[:, 0], cone[:, 1:-1], cone[:, -1] = 1.0, np.sqrt(2) * command / (self._effort * share), -1.0
         self._solver.update(q=linear, b=rhs)
         solution = self._solver.solve()
-        forces = np.clip(np.array(solution.x[:count]) * unit, lower, upper)
-        if not np.all(np.isfinite(forces)):
-            forces = np.clip(previous, lower, upper)
-            cost = problem.objective(forces, command, previous)
-            return forces, StepStatus.ALLOCATION_FAILED, np.array([cost, cost, 0.0, float(solution.iterations)])
         multipliers = np.array(solution.z[2 * count :]).reshape(vertices, rows + 2)
-        weights = multipliers[:, 0] + multipliers[:, -1]
-        gap = problem.gap(forces, weights, command, previous, lower, upper)
-        cost = problem.objective(forces, command, previous)
-        floor = ROUNDING_FLOOR * problem.accuracy_weight * self._full**2
-        status = StepStatus(0) if gap <= TOLERANCE * cost + floor else StepStatus.ALLOCATION_INEXACT
-        worst = int(np.argmax(problem.vertex_costs(forces, command)))
-        return forces, status, np.array([gap, cost, float(worst), float(solution.iterations)])
+        return Found(
+            forces=np.array(solution.x[:count]) * unit,
+            weights=multipliers[:, 0] + multipliers[:, -1],
+            iterations=int(solution.iterations),
+            claimed=str(solution.status) == "Solved",
+            seconds=float(solution.solve_time),
+        )
+
+
+def set_up(problem: AllocationProblem, *, tolerance: float = 1e-9) -> _Cone:
+    """Return the cone program of a problem, factorised once; `tolerance` is Clarabel's own."""
+    return _Cone(problem, tolerance)

@@ -1,0 +1,131 @@
+"""Allocate: one command, or command after command with a warm start."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+
+from casadi_gnc.allocation import backends
+from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, certify, saturation
+from casadi_gnc.allocation.backends import Capability, Found
+from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.errors import AllocationError
+
+Accuracy = Literal["low", "mid", "high"]
+
+
+class Allocator:
+    """Solve a problem for command after command; the last forces are the next previous ones.
+
+    Parameters
+    ----------
+    problem : what stays the same.
+    backend : name of a back end, see `casadi_gnc.allocation.backends`.
+    accuracy : "low", "mid" or "high": to which gap an answer counts as certified.
+    options : of the back end; an unknown one is an error.
+
+    Raises
+    ------
+    AllocationError
+        For an unknown or missing back end, or one that cannot solve this kind of problem.
+    """
+
+    def __init__(
+        self, problem: AllocationProblem, backend: str = "clarabel", *, accuracy: Accuracy = "mid", **options: Any
+    ) -> None:
+        if accuracy not in ACCURACIES:
+            raise AllocationError(f"accuracy {accuracy!r} is not known; there is {', '.join(ACCURACIES)}")
+        self._module = backends.module(backend)
+        lacking = backends.missing(backend)
+        if lacking:
+            raise AllocationError(f"back end {backend!r} needs {', '.join(lacking)}, which is not installed")
+        if problem.is_robust and Capability.ROBUST not in self._module.CAPABILITIES:
+            raise AllocationError(
+                f"back end {backend!r} solves problems without uncertainty only; "
+                "leave coupling and errors out, or take another back end"
+            )
+        self.backend, self._accuracy, self._options = backend, ACCURACIES[accuracy], options
+        self._set_up(problem)
+        self.previous = np.clip(np.zeros(problem.count), problem.lower, problem.upper)
+
+    def _set_up(self, problem: AllocationProblem) -> None:
+        self.problem = problem
+        try:
+            self._solver: backends.Solver = self._module.set_up(problem, **self._options)
+        except TypeError as error:
+            raise AllocationError(f"back end {self.backend!r}: {error}") from error
+
+    def update(self, **changes: Any) -> None:
+        """Change fields of the problem (bounds, weights, effectiveness) and keep the last forces."""
+        self._set_up(replace(self.problem, **changes))
+
+    def solve(self, command: Any, previous: Any = None) -> Answer:
+        """Return the allocation of a command.
+
+        Parameters
+        ----------
+        command : u, (R,), [N m].
+        previous : Fp, (N,), [N]; those of the last call by default, at first zero.
+
+        Raises
+        ------
+        AllocationError
+            For a wrong shape. Numbers that are not finite give the status BAD_COMMAND.
+        """
+        problem = self.problem
+        u, last = np.array(command, dtype=float), self.previous if previous is None else np.array(previous, dtype=float)
+        rows = len(problem.effectiveness)
+        if u.shape != (rows,) or last.shape != (problem.count,):
+            raise AllocationError(
+                f"command has shape {u.shape}, expected ({rows},); previous {last.shape}, expected ({problem.count},)"
+            )
+        started = time.perf_counter()
+        if not (np.all(np.isfinite(u)) and np.all(np.isfinite(last))):
+            kept = np.clip(np.where(np.isfinite(last), last, self.previous), problem.lower, problem.upper)
+            return self._answer(
+                np.where(np.isfinite(u), u, 0.0),
+                kept,
+                Found(kept, claimed=False),
+                AllocationStatus.BAD_COMMAND,
+                started,
+            )
+        lower, upper = problem.box(last)
+        return self._answer(u, last, self._solver.find(u, last, lower, upper), None, started)
+
+    def _answer(
+        self, u: np.ndarray, last: np.ndarray, found: Found, status: AllocationStatus | None, started: float
+    ) -> Answer:
+        problem = self.problem
+        lower, upper = problem.box(last)
+        usable = np.all(np.isfinite(found.forces))
+        forces = np.clip(found.forces if usable else last, lower, upper)
+        seconds = time.perf_counter() - started
+        cost, gap, weights, certified = certify(problem, u, last, forces, found.weights, self._accuracy)
+        if status is None:
+            status = certified if usable else AllocationStatus.FAILED
+        self.previous = forces
+        return Answer(
+            forces=forces,
+            objective=cost,
+            duality_gap=gap,
+            vertex_weights=weights,
+            worst_vertex=int(np.argmax(problem.vertex_costs(forces, u))),
+            unallocated=u - problem.effectiveness @ forces,
+            saturation=saturation(problem, forces, last),
+            status=status,
+            iterations=found.iterations,
+            claimed=found.claimed,
+            backend=self.backend,
+            seconds=seconds,
+            solver_seconds=found.seconds,
+        )
+
+
+def solve(
+    problem: AllocationProblem, command: Any, previous: Any = None, *, backend: str = "clarabel", **options: Any
+) -> Answer:
+    """Return the allocation of one command; arguments as for `Allocator` and `Allocator.solve`."""
+    return Allocator(problem, backend, **options).solve(command, previous)

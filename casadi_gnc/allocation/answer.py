@@ -1,0 +1,153 @@
+"""What an allocation returns: forces, and our own proof of how good they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+import numpy as np
+
+from casadi_gnc.allocation.problem import AllocationProblem
+
+#: Relative gap and rounding floor (share of h |largest effort|^2) by name of the accuracy wanted.
+ACCURACIES = {"low": (1e-3, 1e-6), "mid": (1e-6, 1e-10), "high": (1e-8, 1e-14)}
+
+
+class AllocationStatus(Enum):
+    """How an allocation ended; the value is the sentence for the reader."""
+
+    OPTIMAL = "The forces are optimal to the tolerance, by our certificate."
+    AT_ROUNDING = "The forces are optimal to the rounding floor of the arithmetic, by our certificate."
+    NOT_CERTIFIED = "The forces are feasible, but the certificate does not reach the tolerance; see the gap."
+    FAILED = "The solver returned nothing usable; the previous forces were kept inside the bounds."
+    BAD_COMMAND = "The command or the previous forces are not finite; the previous forces were kept inside the bounds."
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether the forces are proved optimal."""
+        return self in (AllocationStatus.OPTIMAL, AllocationStatus.AT_ROUNDING)
+
+
+class Saturation(IntEnum):
+    """Which bound an actuator sits on."""
+
+    FREE = 0
+    LOWER_AMPLITUDE = 1
+    UPPER_AMPLITUDE = 2
+    LOWER_RATE = 3
+    UPPER_RATE = 4
+    STUCK = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Hold one allocation.
+
+    Parameters
+    ----------
+    forces : (N,), inside the bounds.
+    objective : cost of the forces.
+    duality_gap : rigorous bound on the cost above the optimum, computed by us from the data.
+    vertex_weights : (V,), on the simplex: which error is binding.
+    worst_vertex : the error under which most effort is missing.
+    unallocated : (R,), command minus nominal effort, in the unit of the command.
+    saturation : (N,) of `Saturation` codes.
+    status : how it ended.
+    iterations : the solver's count.
+    claimed : whether the solver itself said it had solved the problem.
+    backend : its name.
+    seconds, solver_seconds : wall time of the call, and what the solver says it took (NaN: does not say).
+    """
+
+    forces: np.ndarray
+    objective: float
+    duality_gap: float
+    vertex_weights: np.ndarray
+    worst_vertex: int
+    unallocated: np.ndarray
+    saturation: np.ndarray
+    status: AllocationStatus
+    iterations: int
+    claimed: bool
+    backend: str
+    seconds: float = float("nan")
+    solver_seconds: float = float("nan")
+
+    @property
+    def relative_gap(self) -> float:
+        """Gap over cost; 0 where both vanish."""
+        return self.duality_gap / self.objective if self.objective > 0 else float(self.duality_gap > 0)
+
+
+def certify(
+    problem: AllocationProblem,
+    command: np.ndarray,
+    previous: np.ndarray,
+    forces: np.ndarray,
+    weights: np.ndarray | None,
+    accuracy: tuple[float, float],
+) -> tuple[float, float, np.ndarray, AllocationStatus]:
+    """Return cost, gap, vertex weights and status of feasible forces.
+
+    Parameters
+    ----------
+    weights : (V,), the solver's multipliers; None where it gives none, then weights are sought that
+        make the gap small.
+    accuracy : relative tolerance and rounding floor, see `ACCURACIES`.
+    """
+    lower, upper = problem.box(previous)
+    sample = (command, previous, lower, upper)
+    if weights is None or not np.all(np.isfinite(weights)) or np.max(weights) <= 0:
+        weights = best_weights(problem, forces, *sample)
+    lam: np.ndarray = np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum()
+    cost, gap = problem.objective(forces, command, previous), problem.gap(forces, lam, *sample)
+    floor = accuracy[1] * problem.accuracy_weight * max(problem.full_effort, float(np.linalg.norm(command))) ** 2
+    if gap <= accuracy[0] * cost:
+        return cost, gap, lam, AllocationStatus.OPTIMAL
+    status = AllocationStatus.AT_ROUNDING if gap <= floor else AllocationStatus.NOT_CERTIFIED
+    return cost, gap, lam, status
+
+
+def best_weights(
+    problem: AllocationProblem,
+    forces: np.ndarray,
+    command: np.ndarray,
+    previous: np.ndarray,
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> np.ndarray:
+    """Return vertex weights that make the gap of given forces small, for solvers without multipliers.
+
+    At an optimum the weighted gradient vanishes on the free actuators and only worst vertices have
+    weight: a non-negative least-squares problem in the weights.
+    """
+    vertices = len(problem.errors)
+    if vertices == 1:
+        return np.ones(1)
+    from scipy.optimize import nnls
+
+    costs = problem.vertex_costs(forces, command)
+    missing = command - problem.vertices @ forces
+    gradients = -2 * problem.accuracy_weight * np.einsum("vrn,vr->nv", problem.vertices, missing)
+    effort = 2 * problem.effort_weight * (forces - problem.preferred) + 2 * problem.change_weight * (forces - previous)
+    span = upper - lower
+    free = (forces > lower + 1e-6 * span) & (forces < upper - 1e-6 * span)
+    reach = np.maximum(np.abs(problem.lower), np.abs(problem.upper))[:, None]
+    scale = max(costs.max(), 1e-300)
+    # Rows: stationarity of free actuators, complementarity of the vertices, weights sum to one.
+    rows = [(gradients * reach)[free] / scale, np.diag(costs.max() - costs) / scale, 10 * np.ones((1, vertices))]
+    right = [-(effort[:, None] * reach)[free, 0] / scale, np.zeros(vertices), [10.0]]
+    weights, _ = nnls(np.vstack(rows), np.concatenate(right))
+    return weights / weights.sum() if weights.sum() > 0 else np.full(vertices, 1 / vertices)
+
+
+def saturation(problem: AllocationProblem, forces: np.ndarray, previous: np.ndarray) -> np.ndarray:
+    """Return the `Saturation` code of every actuator, (N,)."""
+    lower, upper = problem.box(previous)
+    near = 1e-9 * np.maximum(upper - lower, 0.0)
+    codes = np.zeros(len(forces), dtype=int)
+    at_lower, at_upper = forces <= lower + near, forces >= upper - near
+    codes[at_lower] = np.where(lower <= problem.lower, Saturation.LOWER_AMPLITUDE, Saturation.LOWER_RATE)[at_lower]
+    codes[at_upper] = np.where(upper >= problem.upper, Saturation.UPPER_AMPLITUDE, Saturation.UPPER_RATE)[at_upper]
+    codes[lower >= upper] = Saturation.STUCK
+    return codes

@@ -1,0 +1,55 @@
+"""Allocation inside a flight: an expression where there is one, else a solver called every sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc import bounds
+from casadi_gnc.allocation.allocator import Allocator
+from casadi_gnc.allocation.answer import AllocationStatus
+from casadi_gnc.rigid_body import inverse3
+from casadi_gnc.signals import Layout, Signal
+from casadi_gnc.status import StepStatus
+
+
+def pseudo_inverse(effectiveness: ca.DM) -> ca.DM:
+    """Return A'(A A')^-1, (N, 3), by plain arithmetic (no LAPACK, so constants are portable)."""
+    return ca.mtimes(effectiveness.T, inverse3(ca.mtimes(effectiveness, effectiveness.T)))
+
+
+@dataclass(frozen=True, eq=False)
+class PseudoInverse:
+    """Allocate by the clipped pseudo-inverse, as a CasADi expression; `effectiveness` has full row rank."""
+
+    effectiveness: ca.DM
+    report = Layout()
+
+    def expression(self, command: Any, previous: Any, lower: Any, upper: Any) -> Any:
+        """Return F, (N,), as an expression of its arguments."""
+        return bounds.clip(ca.mtimes(pseudo_inverse(self.effectiveness), command), lower, upper)
+
+
+class SolverInFlight:
+    """Call an `Allocator` every sample, and report its certificate in the record."""
+
+    report = Layout((Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations")))
+
+    def __init__(self, allocator: Allocator) -> None:
+        self.allocator = allocator
+
+    def solve(
+        self, command: np.ndarray, previous: np.ndarray, lower: np.ndarray, upper: np.ndarray
+    ) -> tuple[np.ndarray, StepStatus, np.ndarray]:
+        """Return forces (N,) inside the box, status bits, and the numbers of `report`."""
+        answer = self.allocator.solve(command, previous)
+        status = StepStatus(0)
+        if answer.status is AllocationStatus.NOT_CERTIFIED:
+            status = StepStatus.ALLOCATION_INEXACT
+        elif not answer.status.is_certified:
+            status = StepStatus.ALLOCATION_FAILED
+        report = [answer.duality_gap, answer.objective, float(answer.worst_vertex), float(answer.iterations)]
+        return np.clip(answer.forces, lower, upper), status, np.array(report)
