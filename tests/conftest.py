@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.embedded.compilers import Compiler, _probe
+from casadi_gnc.compilers import Compiler, _probe
 
 
 @pytest.fixture

@@ -10,11 +10,12 @@
 
 from casadi_gnc.allocation.allocator import Allocator, solve
 from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, Saturation, best_weights, certify
-from casadi_gnc.allocation.in_flight import PseudoInverse, SolverInFlight, pseudo_inverse
+from casadi_gnc.allocation.in_flight import Allocate, PseudoInverse, SolverInFlight, pseudo_inverse
 from casadi_gnc.allocation.problem import AllocationProblem
 
 __all__ = [
     "ACCURACIES",
+    "Allocate",
     "AllocationProblem",
     "AllocationStatus",
     "Allocator",

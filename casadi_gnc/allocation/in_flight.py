@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from casadi_gnc import bounds
 from casadi_gnc.allocation.allocator import Allocator
 from casadi_gnc.allocation.answer import AllocationStatus
+from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.rigid_body import inverse3
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
@@ -33,23 +35,39 @@ class PseudoInverse:
         return bounds.clip(ca.mtimes(pseudo_inverse(self.effectiveness), command), lower, upper)
 
 
+#: What one sample of an allocation leaves in the record.
+CERTIFICATE = Layout((Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations")))
+
+#: (command, previous, lower, upper) -> (forces inside the box, status bits, numbers of the report)
+Allocate = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, int, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
 class SolverInFlight:
-    """Call an `Allocator` every sample, and report its certificate in the record."""
+    """Call a back end every sample, and report its certificate in the record.
 
-    report = Layout((Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations")))
+    Parameters
+    ----------
+    problem : what is allocated.
+    backend : its name.
+    """
 
-    def __init__(self, allocator: Allocator) -> None:
-        self.allocator = allocator
+    problem: AllocationProblem
+    backend: str = "clarabel"
+    report = CERTIFICATE
 
-    def solve(
-        self, command: np.ndarray, previous: np.ndarray, lower: np.ndarray, upper: np.ndarray
-    ) -> tuple[np.ndarray, StepStatus, np.ndarray]:
-        """Return forces (N,) inside the box, status bits, and the numbers of `report`."""
-        answer = self.allocator.solve(command, previous)
-        status = StepStatus(0)
-        if answer.status is AllocationStatus.NOT_CERTIFIED:
-            status = StepStatus.ALLOCATION_INEXACT
-        elif not answer.status.is_certified:
-            status = StepStatus.ALLOCATION_FAILED
-        report = [answer.duality_gap, answer.objective, float(answer.worst_vertex), float(answer.iterations)]
-        return np.clip(answer.forces, lower, upper), status, np.array(report)
+    def start(self) -> Allocate:
+        """Return the function of one flight; what a solver remembers belongs to that flight alone."""
+        allocator = Allocator(self.problem, self.backend)
+
+        def allocate(command: Any, previous: Any, lower: Any, upper: Any) -> tuple[np.ndarray, int, np.ndarray]:
+            answer = allocator.solve(command, previous)
+            status = StepStatus(0)
+            if answer.status is AllocationStatus.NOT_CERTIFIED:
+                status = StepStatus.ALLOCATION_INEXACT
+            elif not answer.status.is_certified:
+                status = StepStatus.ALLOCATION_FAILED
+            report = [answer.duality_gap, answer.objective, float(answer.worst_vertex), float(answer.iterations)]
+            return np.clip(answer.forces, lower, upper), int(status), np.array(report)
+
+        return allocate

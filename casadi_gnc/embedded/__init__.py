@@ -1,1 +1,1 @@
-"""From tapes to C: the printer, compilers, compiled engines."""
+"""From tapes to C: the printer."""

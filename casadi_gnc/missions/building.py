@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc import attitude
-from casadi_gnc.allocation import AllocationProblem, Allocator, PseudoInverse, SolverInFlight
+from casadi_gnc.allocation import AllocationProblem, PseudoInverse, SolverInFlight
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import LAWS, PerformanceFunnel, gains_of
 from casadi_gnc.missions import schema, tapes
@@ -211,4 +211,4 @@ def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft, timing:
         change_weight=model.change_weight,
         accuracy_weight=model.accuracy_weight,
     )
-    return SolverInFlight(Allocator(problem, model.backend))
+    return SolverInFlight(problem, model.backend)

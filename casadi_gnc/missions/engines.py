@@ -7,7 +7,6 @@ library's elementary functions they write the same words.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -15,14 +14,11 @@ import casadi as ca
 import jinja2
 import numpy as np
 
-from casadi_gnc import assets
-from casadi_gnc.embedded import compilers
+from casadi_gnc import assets, compilers
+from casadi_gnc.allocation import Allocate
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
 from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.missions.tapes import Tapes
-
-#: (limited, previous, lower, upper) -> (forces, status bits, report)
-Solve = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, int, np.ndarray]]
 
 
 @dataclass(eq=False)
@@ -111,7 +107,7 @@ class CompiledEngine:
         self._fly = ctypes.CDLL(str(self.library)).gnc_fly
         self._fly.restype, self._fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
         self._failure: BaseException | None = None
-        self._solve = None if tapes.symbolic else scheme.actuation.allocator.solve
+        self._solve = None if tapes.symbolic else scheme.actuation.allocator.start()
         self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
         self._callback = _ALLOCATOR(self._allocate)
 
@@ -178,7 +174,7 @@ class VirtualMachineEngine:
         self._timing = mission.timing
         self._states = mission.truth.state.size
         self._report = np.zeros(scheme.actuation.allocator.report.size)
-        self._solve: Solve | None = None if tapes.symbolic else scheme.actuation.allocator.solve
+        self._solve: Allocate | None = None if tapes.symbolic else scheme.actuation.allocator.start()
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly sample by sample, as the loop of `flight.c.j2` does."""

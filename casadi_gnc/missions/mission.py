@@ -65,7 +65,7 @@ class Actuation:
     lower, upper : (N,), amplitude bounds, [N].
     rate : largest change [N/s], `inf` for none.
     limit_below, limit_above : (R,), box of the virtual control, [N m].
-    allocator : an object with `report` and either `expression` (CasADi) or `solve` (numpy).
+    allocator : an object with `report` and either `expression` (CasADi) or `start` (numpy).
     """
 
     effectiveness: ca.DM

@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 import casadi_gnc
-from casadi_gnc.embedded import compilers
+from casadi_gnc import compilers
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin

@@ -13,7 +13,19 @@ import casadi_gnc
 ROOT = Path(casadi_gnc.__file__).parent
 FLOORS = {
     **dict.fromkeys(
-        ("errors", "status", "exact", "assets", "signals", "bounds", "attitude", "rigid_body", "thrusters"), 0
+        (
+            "errors",
+            "status",
+            "exact",
+            "assets",
+            "compilers",
+            "signals",
+            "bounds",
+            "attitude",
+            "rigid_body",
+            "thrusters",
+        ),
+        0,
     ),
     **dict.fromkeys(("plants", "laws", "allocation", "synthesis"), 1),
     "embedded": 2,

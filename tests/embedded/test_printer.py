@@ -6,8 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc import assets
-from casadi_gnc.embedded import compilers
+from casadi_gnc import assets, compilers
 from casadi_gnc.embedded.printer import c_constant, print_function
 from casadi_gnc.errors import PrinterError
 

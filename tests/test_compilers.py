@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from casadi_gnc import assets
-from casadi_gnc.embedded import compilers
+from casadi_gnc import assets, compilers
 from casadi_gnc.errors import CompilerError, NoCompilerError
 
 SOURCE = "int answer(void);\nint answer(void) { return 42; }\n"
@@ -76,7 +75,7 @@ def test_unwritable_cache_falls_back(monkeypatch, tmp_path):
 
 def test_two_processes_may_build_at_once(folder):
     script = (
-        "from pathlib import Path; from casadi_gnc.embedded import compilers; "
+        "from pathlib import Path; from casadi_gnc import compilers; "
         f"print(compilers.build({SOURCE!r}, include=Path({str(INCLUDE)!r})))"
     )
     runs = [
