@@ -162,7 +162,14 @@ def test_interrupted_flight_leaves_no_half_file(tmp_path):
         "--scheme",
         "observer_robust",
     ]
-    flight = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    # A background shell starts its children with SIGINT ignored; a terminal does not.
+    flight = subprocess.Popen(
+        command,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
     time.sleep(3)
     flight.send_signal(signal.SIGINT)
     _, errors = flight.communicate(timeout=60)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.embedded import compilers
+from casadi_gnc import compilers
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
