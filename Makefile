@@ -8,7 +8,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test bench lint docs clean
+.PHONY: demo test bench pictures lint docs clean
 
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
@@ -20,6 +20,12 @@ lint: .venv/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
+
+# The pictures of the documentation, from flights made now.
+pictures: .venv/installed
+	$(BIN)/casadi-gnc fly problems/huang2020/slew.toml --out $(OUT)/slew
+	$(BIN)/casadi-gnc attainable problems/huang2020/allocation.toml --plot docs/images/attainable.png
+	cp $(OUT)/slew/funnel_robust.png docs/images/slew.png
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/flight_speed.py

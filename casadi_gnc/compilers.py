@@ -8,8 +8,10 @@ renamed, so an interrupted build leaves no broken entry.
 from __future__ import annotations
 
 import atexit
+import ctypes
 import hashlib
 import os
+import platform
 import shlex
 import shutil
 import subprocess
@@ -18,6 +20,7 @@ import tempfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
@@ -42,10 +45,17 @@ class Compiler:
         return Path(self.command[0]).name
 
 
+def _chosen() -> tuple[str, ...] | None:
+    """Return the command that $CC names, if any; raise `CompilerError` if it cannot be read."""
+    text = os.environ.get("CC", "").strip()
+    try:
+        return tuple(shlex.split(text)) or None
+    except ValueError as error:
+        raise CompilerError(f"the variable CC is {text!r}: {error}") from None
+
+
 def _candidates() -> list[tuple[str, ...]]:
-    chosen = os.environ.get("CC", "").strip()
-    commands = [tuple(shlex.split(chosen))] if chosen else []
-    commands += [("cc",), ("gcc",), ("clang",)]
+    commands: list[tuple[str, ...]] = [("cc",), ("gcc",), ("clang",)]
     try:
         import ziglang  # type: ignore[import-not-found]  # the optional extra `zig`
     except ImportError:
@@ -66,11 +76,25 @@ def _probe(command: tuple[str, ...]) -> Compiler | None:
 
 def available() -> list[Compiler]:
     """Return the compilers found, in order of preference: $CC, cc, gcc, clang, the zig wheel."""
-    return [found for command in _candidates() if (found := _probe(command)) is not None]
+    try:
+        chosen = _chosen()
+    except CompilerError:
+        chosen = None
+    commands = [*([chosen] if chosen else []), *_candidates()]
+    return [found for command in commands if (found := _probe(command)) is not None]
 
 
 def find() -> Compiler:
-    """Return the preferred compiler; raise `NoCompilerError` if there is none."""
+    """Return the preferred compiler.
+
+    Raises
+    ------
+    NoCompilerError, CompilerError
+        If there is none; if $CC names one that cannot be run (no other is taken behind one's back).
+    """
+    chosen = _chosen()
+    if chosen and _probe(chosen) is None:
+        raise CompilerError(f"the variable CC is {shlex.join(chosen)!r}, which cannot be run; unset it or mend it")
     found = available()
     if not found:
         raise NoCompilerError(
@@ -83,17 +107,25 @@ def find() -> Compiler:
 def cache_folder() -> Path:
     """Return the folder of compiled libraries; it may not exist yet."""
     chosen = os.environ.get(CACHE_VARIABLE, "").strip()
-    return Path(chosen) if chosen else Path(platformdirs.user_cache_dir("casadi-gnc"))
+    return Path(chosen).resolve() if chosen else Path(platformdirs.user_cache_dir("casadi-gnc"))
 
 
-def build(source: str, *, include: Path, flags: tuple[str, ...] = ("-O2",), compiler: Compiler | None = None) -> Path:
+def build(
+    source: str,
+    *,
+    include: Path,
+    flags: tuple[str, ...] = ("-O2",),
+    units: tuple[str, ...] = (),
+    compiler: Compiler | None = None,
+) -> Path:
     """Return the path of a shared library built from C text.
 
     Parameters
     ----------
     source : a whole translation unit.
-    include : folder of headers; their content is part of the key.
+    include : folder of headers and of `units`; their content is part of the key.
     flags : added after `FLAGS`.
+    units : further C files of `include` to compile, with the same flags.
     compiler : `find()` by default.
 
     Raises
@@ -103,8 +135,10 @@ def build(source: str, *, include: Path, flags: tuple[str, ...] = ("-O2",), comp
     """
     compiler = compiler or find()
     key = hashlib.sha256()
-    headers = [header.read_text(encoding="utf-8") for header in sorted(include.glob("*.h"))]
-    for part in (source, *headers, *FLAGS, *flags, *compiler.command, compiler.version):
+    read = [*sorted(include.glob("*.h")), *(include / unit for unit in units)]
+    texts = [path.read_text(encoding="utf-8") for path in read]
+    machine = (platform.system(), platform.machine())
+    for part in (source, *texts, *FLAGS, *flags, *compiler.command, compiler.version, *machine):
         key.update(part.encode())
         key.update(b"\0")
     folder = _writable(cache_folder())
@@ -115,15 +149,34 @@ def build(source: str, *, include: Path, flags: tuple[str, ...] = ("-O2",), comp
         unit = Path(workshop) / "unit.c"
         unit.write_text(source, encoding="utf-8")
         product = Path(workshop) / library.name
-        command = [*compiler.command, *FLAGS, *flags, f"-I{include}", "-o", str(product), str(unit), "-lm"]
+        sources = [str(unit), *(str(include / name) for name in units)]
+        command = [*compiler.command, *FLAGS, *flags, f"-I{include}", "-o", str(product), *sources, "-lm"]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=600)
         except (OSError, subprocess.SubprocessError) as error:
             raise CompilerError(f"{compiler.name} could not be run: {error}") from error
-        if done.returncode:
+        if done.returncode or not product.is_file():
             raise CompilerError(f"{compiler.name} refused the generated source: {_first_complaint(done.stderr)}")
+        with product.open("rb") as file:
+            os.fsync(file.fileno())
         os.replace(product, library)
     return library
+
+
+def load(source: str, **options: Any) -> ctypes.CDLL:
+    """Return a built library, loaded; arguments as for `build`.
+
+    A cached file that cannot be loaded (cut short by a full disk, say) is built once more.
+    """
+    path = build(source, **options)
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError:
+        path.unlink(missing_ok=True)
+    try:
+        return ctypes.CDLL(str(build(source, **options)))
+    except OSError as error:
+        raise CompilerError(f"the library just built cannot be loaded: {error}") from error
 
 
 def _first_complaint(text: str) -> str:

@@ -37,5 +37,13 @@ class AllocationError(GncError):
     """Report allocation data that cannot be used: shapes, bounds, weights."""
 
 
+class LawError(GncError):
+    """Report a gain outside its range."""
+
+
+class OutputError(GncError):
+    """Report a folder or file that cannot be written."""
+
+
 class FlightError(GncError):
     """Report a flight that cannot be flown as asked."""

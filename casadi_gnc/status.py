@@ -11,7 +11,9 @@ _SENTENCES = {
     8: "The actuators could not make the limited command; more than 5 % of the limit was missing.",
     16: "The allocation could not be certified to its tolerance; the best feasible forces were used.",
     32: "The allocation found no usable answer; the previous forces were kept inside the box.",
-    64: "The simulated state is no longer finite or credible; later numbers mean nothing.",
+    64: "The simulated state is no longer finite or credible; the flight's metrics mean nothing.",
+    128: "The law's memory was no longer finite or credible; it was started afresh.",
+    256: "The law's command was not finite; none was given on that axis.",
 }
 
 
@@ -31,6 +33,8 @@ class StepStatus(IntFlag):
     ALLOCATION_INEXACT = 16
     ALLOCATION_FAILED = 32
     DIVERGED = 64
+    MEMORY_RESET = 128
+    COMMAND_REPLACED = 256
 
     @property
     def sentences(self) -> list[str]:

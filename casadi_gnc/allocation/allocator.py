@@ -15,6 +15,7 @@ from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
 
 Accuracy = Literal["low", "mid", "high"]
+LARGEST = 1e100  # numbers beyond are no commands, and their squares no numbers
 
 
 class Allocator:
@@ -42,25 +43,29 @@ class Allocator:
         lacking = backends.missing(backend)
         if lacking:
             raise AllocationError(f"back end {backend!r} needs {', '.join(lacking)}, which is not installed")
-        if problem.is_robust and Capability.ROBUST not in self._module.CAPABILITIES:
-            raise AllocationError(
-                f"back end {backend!r} solves problems without uncertainty only; "
-                "leave coupling and errors out, or take another back end"
-            )
         self.backend, self._accuracy, self._options = backend, ACCURACIES[accuracy], options
         self._set_up(problem)
         self.previous = np.clip(np.zeros(problem.count), problem.lower, problem.upper)
 
     def _set_up(self, problem: AllocationProblem) -> None:
-        self.problem = problem
+        if problem.is_robust and Capability.ROBUST not in self._module.CAPABILITIES:
+            raise AllocationError(
+                f"back end {self.backend!r} solves problems without uncertainty only; "
+                "leave coupling and errors out, or take another back end"
+            )
         try:
             self._solver: backends.Solver = self._module.set_up(problem, **self._options)
         except TypeError as error:
             raise AllocationError(f"back end {self.backend!r}: {error}") from error
+        self.problem = problem
 
     def update(self, **changes: Any) -> None:
         """Change fields of the problem (bounds, weights, effectiveness) and keep the last forces."""
-        self._set_up(replace(self.problem, **changes))
+        try:
+            changed = replace(self.problem, **changes)
+        except TypeError as error:
+            raise AllocationError(f"no such field of the problem: {error}") from error
+        self._set_up(changed)
 
     def solve(self, command: Any, previous: Any = None) -> Answer:
         """Return the allocation of a command.
@@ -73,7 +78,8 @@ class Allocator:
         Raises
         ------
         AllocationError
-            For a wrong shape. Numbers that are not finite give the status BAD_COMMAND.
+            For a wrong shape. Numbers that are not finite, or whose squares would not be, give the
+            status BAD_COMMAND.
         """
         problem = self.problem
         u, last = np.array(command, dtype=float), self.previous if previous is None else np.array(previous, dtype=float)
@@ -83,10 +89,11 @@ class Allocator:
                 f"command has shape {u.shape}, expected ({rows},); previous {last.shape}, expected ({problem.count},)"
             )
         started = time.perf_counter()
-        if not (np.all(np.isfinite(u)) and np.all(np.isfinite(last))):
-            kept = np.clip(np.where(np.isfinite(last), last, self.previous), problem.lower, problem.upper)
+        wanted, known = np.abs(u) <= LARGEST, np.abs(last) <= LARGEST  # false for NaN
+        if not (np.all(wanted) and np.all(known)):
+            kept = np.clip(np.where(known, last, self.previous), problem.lower, problem.upper)
             return self._answer(
-                np.where(np.isfinite(u), u, 0.0),
+                np.where(wanted, u, 0.0),
                 kept,
                 Found(kept, claimed=False),
                 AllocationStatus.BAD_COMMAND,
@@ -100,13 +107,13 @@ class Allocator:
     ) -> Answer:
         problem = self.problem
         lower, upper = problem.box(last)
-        usable = np.all(np.isfinite(found.forces))
+        usable = np.shape(found.forces) == np.shape(lower) and bool(np.all(np.isfinite(found.forces)))
         forces = np.clip(found.forces if usable else last, lower, upper)
         seconds = time.perf_counter() - started
         cost, gap, weights, certified = certify(problem, u, last, forces, found.weights, self._accuracy)
         if status is None:
             status = certified if usable else AllocationStatus.FAILED
-        self.previous = forces
+        self.previous = forces.copy()
         return Answer(
             forces=forces,
             objective=cost,

@@ -91,17 +91,24 @@ def certify(
 
     Parameters
     ----------
-    weights : (V,), the solver's multipliers; None where it gives none, then weights are sought that
-        make the gap small.
+    weights : (V,), the solver's multipliers; where it gives none, or poor ones, weights are sought
+        that make the gap small.
     accuracy : relative tolerance and rounding floor, see `ACCURACIES`.
     """
     lower, upper = problem.box(previous)
     sample = (command, previous, lower, upper)
-    if weights is None or not np.all(np.isfinite(weights)) or np.max(weights) <= 0:
-        weights = best_weights(problem, forces, *sample)
-    lam: np.ndarray = np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum()
-    cost, gap = problem.objective(forces, command, previous), problem.gap(forces, lam, *sample)
+    cost = problem.objective(forces, command, previous)
     floor = accuracy[1] * problem.accuracy_weight * max(problem.full_effort, float(np.linalg.norm(command))) ** 2
+    enough = max(accuracy[0] * cost, floor)
+    lam, gap = np.full(len(problem.errors), 1 / len(problem.errors)), np.inf
+    usable = weights is not None and np.shape(weights) == np.shape(lam) and np.all(np.isfinite(weights))
+    if weights is not None and usable and np.max(weights) > 0:
+        lam = np.maximum(weights, 0.0) / np.maximum(weights, 0.0).sum()
+        gap = problem.gap(forces, lam, *sample)
+    if not gap <= enough:  # the forces may still be good where the multipliers are not
+        other = best_weights(problem, forces, *sample)
+        better = problem.gap(forces, other, *sample)
+        lam, gap = (other, better) if not gap <= better else (lam, gap)
     if gap <= accuracy[0] * cost:
         return cost, gap, lam, AllocationStatus.OPTIMAL
     status = AllocationStatus.AT_ROUNDING if gap <= floor else AllocationStatus.NOT_CERTIFIED
@@ -118,8 +125,10 @@ def best_weights(
 ) -> np.ndarray:
     """Return vertex weights that make the gap of given forces small, for solvers without multipliers.
 
-    At an optimum the weighted gradient vanishes on the free actuators and only worst vertices have
-    weight: a non-negative least-squares problem in the weights.
+    The gap is convex in the weights: a vertex costs its distance to the worst one, and an actuator
+    whose gradient is -(s + p - m), with p and m not negative, costs s^2/2q + p up + m down, where up
+    and down are what the box leaves. That is a non-negative least-squares problem in (lambda, p, m)
+    but for its linear part L, which enters as (L + 1/2)^2: the two agree where the gap vanishes.
     """
     vertices = len(problem.errors)
     if vertices == 1:
@@ -130,15 +139,31 @@ def best_weights(
     missing = command - problem.vertices @ forces
     gradients = -2 * problem.accuracy_weight * np.einsum("vrn,vr->nv", problem.vertices, missing)
     effort = 2 * problem.effort_weight * (forces - problem.preferred) + 2 * problem.change_weight * (forces - previous)
-    span = upper - lower
-    free = (forces > lower + 1e-6 * span) & (forces < upper - 1e-6 * span)
-    reach = np.maximum(np.abs(problem.lower), np.abs(problem.upper))[:, None]
-    scale = max(costs.max(), 1e-300)
-    # Rows: stationarity of free actuators, complementarity of the vertices, weights sum to one.
-    rows = [(gradients * reach)[free] / scale, np.diag(costs.max() - costs) / scale, 10 * np.ones((1, vertices))]
-    right = [-(effort[:, None] * reach)[free, 0] / scale, np.zeros(vertices), [10.0]]
-    weights, _ = nnls(np.vstack(rows), np.concatenate(right))
-    return weights / weights.sum() if weights.sum() > 0 else np.full(vertices, 1 / vertices)
+    moving = upper > lower
+    gradients, effort, count = gradients[moving], effort[moving], int(moving.sum())
+    up, down = (upper - forces)[moving], (forces - lower)[moving]
+    curvature = 2 * (problem.effort_weight + problem.change_weight)[moving]
+    stiffness = 2 * problem.accuracy_weight * np.max(np.sum(problem.vertices**2, axis=1), initial=0.0)
+    largest = max(problem.full_effort, float(np.linalg.norm(command)))
+    unit = max(problem.objective(forces, command, previous), 1e-18 * problem.accuracy_weight * largest**2)
+    equal = np.full(vertices, 1 / vertices)
+    if not 0 < unit < np.inf or not stiffness > 0:  # no effort can be made: there is nothing to weigh
+        return equal
+    row = 1 / np.sqrt(2 * unit * np.maximum(curvature, 1e-9 * stiffness))
+    rows = np.vstack(
+        [
+            np.hstack([gradients * row[:, None], np.diag(row), -np.diag(row)]),
+            np.concatenate([costs.max() - costs, up, down])[None] / unit,
+            1e3 * np.concatenate([np.ones(vertices), np.zeros(2 * count)])[None],
+        ]
+    )
+    right = np.concatenate([-effort * row, [-0.5, 1e3]])
+    size = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    try:
+        weights = (nnls(rows / size, right, maxiter=20 * len(size))[0] / size)[:vertices]
+    except RuntimeError:  # too many iterations: any weights are allowed, these are seldom good
+        return equal
+    return weights / weights.sum() if weights.sum() > 0 else equal
 
 
 def saturation(problem: AllocationProblem, forces: np.ndarray, previous: np.ndarray) -> np.ndarray:

@@ -9,10 +9,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import bounds
+from casadi_gnc import bounds, compilers
 from casadi_gnc.allocation.allocator import Allocator
 from casadi_gnc.allocation.answer import AllocationStatus
+from casadi_gnc.allocation.online import OnlineSolver
 from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.errors import NoCompilerError
 from casadi_gnc.rigid_body import inverse3
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
@@ -71,3 +73,44 @@ class SolverInFlight:
             return np.clip(answer.forces, lower, upper), int(status), np.array(report)
 
         return allocate
+
+
+@dataclass(frozen=True, eq=False)
+class OnlineInFlight:
+    """Allocate by the on-board solver, which compiled flights call without leaving the C.
+
+    Parameters
+    ----------
+    problem : what is allocated.
+    """
+
+    problem: AllocationProblem
+    report = CERTIFICATE
+
+    def solver(self, compiler: compilers.Compiler | None = None) -> OnlineSolver:
+        """Return a fresh solver, whose memory a compiled flight may use."""
+        return OnlineSolver(self.problem, compiler=compiler)
+
+    def start(self) -> Allocate:
+        """Return the function of one flight: the same compiled solver, called from Python.
+
+        Without a compiler the cone solver takes its place; its forces differ within both gaps.
+        """
+        try:
+            solver = self.solver()
+        except NoCompilerError:
+            return SolverInFlight(self.problem, "clarabel").start()
+
+        def allocate(command: Any, previous: Any, lower: Any, upper: Any) -> tuple[np.ndarray, int, np.ndarray]:
+            raw = solver.solve(command, previous, lower, upper)
+            report = [raw.gap, raw.objective, float(raw.worst_vertex), float(raw.iterations)]
+            return raw.forces, int(online_status(raw.status)), np.array(report)
+
+        return allocate
+
+
+def online_status(code: int) -> StepStatus:
+    """Return the step status that belongs to a status code of `gnc_allocate.h`."""
+    if code <= 1:  # optimal, or at the rounding floor
+        return StepStatus(0)
+    return StepStatus.ALLOCATION_INEXACT if code == 2 else StepStatus.ALLOCATION_FAILED

@@ -92,7 +92,7 @@ def combine(*problems: AllocationProblem) -> AllocationProblem:
     }
     return AllocationProblem(
         effectiveness=np.hstack([p.effectiveness for p in problems]),
-        coupling=block_diag(*(p.coupling for p in problems)).reshape(-1, sum(p.count for p in problems)),
+        coupling=np.reshape(block_diag(*(p.coupling for p in problems)), (-1, sum(p.count for p in problems))),
         errors=np.array([np.hstack(corners) for corners in product(*(p.errors for p in problems))]),
         accuracy_weight=first.accuracy_weight,
         **joined,

@@ -48,13 +48,14 @@ def fly(
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
     """Fly a mission and write <scheme>.npz, summary.json and pictures."""
+    from casadi_gnc.files import prepare_folder
     from casadi_gnc.missions import flight as results
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.missions.loading import load
 
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
-    folder = results.prepare_folder(out)
+    folder = prepare_folder(out)
     flights, written = [], []
     for name in dict.fromkeys(chosen):
         with _Progress(name, quiet=json) as progress:
@@ -115,10 +116,11 @@ class _Progress:
 
 def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None:
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
 
     console = Console(soft_wrap=True)
-    table = Table(title=mission.title or mission.name)
+    table = Table(title=escape(mission.title or mission.name))
     table.add_column("scheme")
     for metric in mission.metrics:
         unit = f" [{metric.unit}]" if metric.unit else ""
@@ -131,7 +133,9 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
         for bit, (count, first) in flight.statuses.items():
             share = 100 * count / mission.timing.samples
             console.print(
-                f"{flight.scheme}: {share:.3g} % of samples, first at {first:g} s: {bit.sentences[0]}", highlight=False
+                f"{flight.scheme}: {share:.3g} % of samples, first at {first:g} s: {bit.sentences[0]}",
+                highlight=False,
+                markup=False,
             )
         for note in flight.notes:
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)

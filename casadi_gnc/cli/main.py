@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import typer
 
-from casadi_gnc.cli import doctor, fly, problems, schema
+from casadi_gnc.cli import allocate, attainable, doctor, fly, problems, schema
 from casadi_gnc.errors import GncError
 
 app = typer.Typer(
@@ -18,6 +19,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command("fly")(fly.fly)
+app.command("allocate")(allocate.allocate)
+app.command("attainable")(attainable.attainable)
 app.add_typer(problems.app, name="problems")
 app.command("schema")(schema.schema)
 app.command("doctor")(doctor.doctor)
@@ -27,16 +30,27 @@ def main() -> None:
     """Run the command line; turn what a user can put right into one sentence on stderr."""
     try:
         app()
+        sys.stdout.flush()
     except GncError as error:
-        print(f"casadi-gnc: {error}", file=sys.stderr)  # noqa: T201
-        sys.exit(2)
+        _end(f"casadi-gnc: {error}", 2)
     except KeyboardInterrupt:
-        print("casadi-gnc: interrupted; files already complete were kept", file=sys.stderr)  # noqa: T201
-        sys.exit(130)
+        _end("casadi-gnc: interrupted; files already complete were kept", 130)
     except BrokenPipeError:
-        # The reader went away; point stdout elsewhere so that the interpreter's last flush is quiet.
-        sys.stdout = None
+        _silence()
         sys.exit(0)
+    except OSError as error:
+        _silence()
+        _end(f"casadi-gnc: cannot write the output: {error.strerror or error}", 2)
+
+
+def _end(sentence: str, code: int) -> None:
+    print(sentence, file=sys.stderr)  # noqa: T201
+    sys.exit(code)
+
+
+def _silence() -> None:
+    """Point stdout elsewhere, so that the interpreter's last flush of a lost reader is quiet."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

@@ -31,7 +31,7 @@ def copy(
 ) -> None:
     """Copy a shipped problem into a folder; an existing file is never overwritten."""
     from casadi_gnc.errors import ProblemError
-    from casadi_gnc.missions.flight import prepare_folder, write_beside
+    from casadi_gnc.files import prepare_folder, write_beside
     from casadi_gnc.missions.loading import read, shipped
 
     if name.removesuffix(".toml") not in shipped():

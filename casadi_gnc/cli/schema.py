@@ -9,7 +9,11 @@ import typer
 
 def schema() -> None:
     """Print the JSON Schema of a problem file."""
+    from pydantic import TypeAdapter
+
+    from casadi_gnc.missions.allocation_file import AllocationModel
     from casadi_gnc.missions.schema import MissionModel
 
-    content = {"$schema": "https://json-schema.org/draft/2020-12/schema", **MissionModel.model_json_schema()}
+    described = TypeAdapter(MissionModel | AllocationModel).json_schema()
+    content = {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
     typer.echo(json.dumps(content, indent=2))

@@ -129,6 +129,7 @@ def print_function(function: ca.Function, *, maths: Math = "gnc", real: Real = "
         body.append(f"    const gnc_real a{len(body)} = {text};")
     arguments = [f"const gnc_real *{name}" for name in inputs] + [f"gnc_real *{name}" for name in outputs]
     unused = [f"    (void){name};" for i, name in enumerate(inputs) if not _is_read(function, i)]
+    unused += [f"    (void){name};" for i, name in enumerate(outputs) if not function.numel_out(i)]
     head = f"static void {function.name()}(\n    " + ",\n    ".join(arguments) + ")\n{"
     return "\n".join([head, *unused, *body, *stores, "}", ""])
 

@@ -9,11 +9,14 @@ advances the memory over the hold.
 from __future__ import annotations
 
 import dataclasses
+import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 
+from casadi_gnc import exact
+from casadi_gnc.errors import LawError
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
 
@@ -62,6 +65,26 @@ class Law:
     memory: ClassVar[Layout] = Layout()
     #: What the law shows besides its command, for records and plots.
     outputs: ClassVar[Layout] = Layout()
+
+    def __post_init__(self) -> None:
+        for name, declared in gains_of(type(self)).items():
+            value, about = getattr(self, name), declared.metadata
+            if value is None or not exact.is_number(value):
+                continue
+            numbers = ca.DM(value).nonzeros()
+            low, above = about["minimum"], about["above"]
+            sound = all(
+                math.isfinite(n) and (low is None or n >= low) and (above is None or n > above) for n in numbers
+            )
+            if not sound:
+                expected = (
+                    f"more than {above:g}"
+                    if above is not None
+                    else f"at least {low:g}"
+                    if low is not None
+                    else "finite"
+                )
+                raise LawError(f"{name} is {value}, expected {expected}")
 
     def sign(self, erratum: str) -> int:
         """Return -1 where the source's sign is kept as printed, +1 where it is corrected."""

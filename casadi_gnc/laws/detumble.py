@@ -49,7 +49,7 @@ class Detumble(Law):
     observer_gain: Any = gain("1/s", "pole of the disturbance estimate", symbol="beta_omega", above=0.0)
 
     inputs = Layout((Signal("rate", 3, "rad/s"),))
-    memory = Layout((Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m")))
+    memory = Layout((Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m s")))
     outputs = Layout((Signal("disturbance_estimate", 3, "rad/s^2"),))
     errata = {"anti_windup_sign": "(43) prints -k3 B zeta; with (38) that is positive feedback when saturated."}
 

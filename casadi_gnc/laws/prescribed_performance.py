@@ -73,7 +73,9 @@ class PrescribedPerformance(Law):
     braking_floor: Any = gain("-", "MRP at which the braking limit stops shrinking", above=0.0, default=1e-6)
 
     inputs = Layout((Signal("mrp", 3, "-"), Signal("rate", 3, "rad/s")))
-    memory = Layout((Signal("rate_command", 3, "rad/s"), Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m")))
+    memory = Layout(
+        (Signal("rate_command", 3, "rad/s"), Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m s"))
+    )
     outputs = Layout((Signal("rate_command", 3, "rad/s"), Signal("disturbance_estimate", 3, "rad/s^2")))
     errata = {
         "filter_rate_sign": "(36) prints + y2/tau, which adds the filter's rate twice instead of following it.",

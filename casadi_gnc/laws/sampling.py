@@ -14,6 +14,7 @@ plant does *not* stand still during the hold (see `casadi_gnc.laws.disturbance_o
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import casadi as ca
@@ -58,9 +59,10 @@ def _phi1(a: ca.SX) -> ca.SX:
     if a.sparsity().is_diag() or not a.nnz():
         entries = [a[i, i] for i in range(a.shape[0])]
         return ca.diag(ca.vertcat(*(exact.phi1(_number_or_symbol(entry)) for entry in entries)))
-    # Taylor to X^13/14! of X = A/2^10, then phi1(2X) = (e^X + I) phi1(X)/2 ten times: below one
-    # unit of rounding for |A| up to 500, and free of branches for symbolic gains.
-    doublings, identity = 10, ca.SX.eye(a.shape[0])
+    # Taylor to X^13/14! of X = A/2^k, then phi1(2X) = (e^X + I) phi1(X)/2 k times: exact to rounding
+    # for |A| up to 2^(k - 1), free of branches for symbolic gains (k = 10: up to 500).
+    size = float(ca.norm_1(ca.vec(ca.DM(a)))) if a.is_constant() else 0.0
+    doublings, identity = max(10, math.ceil(math.log2(size + 1)) + 1), ca.SX.eye(a.shape[0])
     x = a / 2**doublings
     phi = identity
     for order in range(14, 1, -1):

@@ -10,8 +10,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import attitude
-from casadi_gnc.allocation import AllocationProblem, PseudoInverse, SolverInFlight
+from casadi_gnc.allocation import AllocationProblem, OnlineInFlight, PseudoInverse, SolverInFlight
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import LAWS, PerformanceFunnel, gains_of
 from casadi_gnc.missions import schema, tapes
@@ -22,20 +21,12 @@ from casadi_gnc.rigid_body import RigidBody
 from casadi_gnc.thrusters import ThrusterGeometry
 
 
-def _orientation(model: schema.Orientation) -> ca.DM | None:
-    if model.rotation is not None:
-        return ca.DM(model.rotation)
-    if model.rotation_321_rad is not None:
-        return attitude.frame_rotation(*model.rotation_321_rad)
-    return None
-
-
 def _inertia(craft: schema.Spacecraft) -> ca.DM:
     if craft.inertia_kg_m2 is not None:
         return ca.DM(craft.inertia_kg_m2)
     parts = []
     for part in craft.part:
-        rotation = _orientation(part)
+        rotation = schema.orientation(part)
         turned = ca.DM.eye(3) if rotation is None else rotation
         parts.append(BodyPart(part.mass_kg, part.inertia_kg_m2, part.position_m, turned))
     return compose_inertia(parts)
@@ -59,7 +50,7 @@ class _Craft:
 def build(model: schema.MissionModel, path: Path, text: str) -> Mission:
     """Return the mission that a checked file describes; path and text serve messages."""
     craft, truth, environment = model.spacecraft, model.truth, model.environment
-    rotation = _orientation(craft)
+    rotation = schema.orientation(craft)
     rotation = ca.DM.eye(3) if rotation is None else rotation
     inertia = _inertia(craft)
     centre = craft.centre_of_mass_m
@@ -77,7 +68,7 @@ def build(model: schema.MissionModel, path: Path, text: str) -> Mission:
         craft.rate_limit_rad_per_s,
     )
     believed = model.believed
-    thought_rotation = _orientation(believed)
+    thought_rotation = schema.orientation(believed)
     thought = _Craft(
         craft,
         rotation if thought_rotation is None else thought_rotation,
@@ -91,6 +82,8 @@ def build(model: schema.MissionModel, path: Path, text: str) -> Mission:
     timing = Timing(
         model.timing.mode, model.timing.sample_period_s, model.timing.duration_s, model.timing.plant_substeps
     )
+    start = [*model.initial.mrp, *model.initial.rate_rad_per_s]
+    _check_start(start, plant, path, text)
     funnel = _funnel(model, plant, path, text)
     schemes = tuple(
         _scheme(scheme, i, craft, thought, body, funnel, timing, path, text) for i, scheme in enumerate(model.scheme)
@@ -98,7 +91,7 @@ def build(model: schema.MissionModel, path: Path, text: str) -> Mission:
     mission = Mission(
         name=path.stem,
         truth=plant,
-        start=[*model.initial.mrp, *model.initial.rate_rad_per_s],
+        start=start,
         timing=timing,
         schemes=schemes,
         funnel=funnel,
@@ -123,8 +116,18 @@ def _with_metrics(mission: Mission, model: schema.MissionModel, path: Path, text
             if metric.kind == "settling"
             else tapes.row_layout(mission, mission.schemes[0]).signal(metric.signal).unit
         )
-        metrics.append(Metric(metric.name, metric.kind, metric.signal, metric.threshold, metric.after_s, unit))
+        metrics.append(Metric(metric.name, metric.kind, metric.signal, metric.threshold or 0.0, metric.after_s, unit))
     return dataclasses.replace(mission, metrics=tuple(metrics))
+
+
+def _check_start(start: list[float], plant: CombinedSpacecraft, path: Path, text: str) -> None:
+    """Refuse a start that the sensors could not measure: a controller has no good value before it."""
+    keys = {"mrp": "mrp", "rate": "rate_rad_per_s"}
+    for signal in plant.measurement.signals:
+        largest = max(abs(value) for value in start[plant.measurement.place(signal.name)])
+        if largest > signal.limit:
+            place = describe(path, text, ("initial", keys[signal.name]))
+            raise ProblemError(f"{largest:g} is beyond the largest credible {signal.name}, {signal.limit:g}", place)
 
 
 def _funnel(model: schema.MissionModel, plant: CombinedSpacecraft, path: Path, text: str) -> Funnel | None:
@@ -179,8 +182,15 @@ def _scheme(
         if funnel is None:
             place = describe(path, text, ("scheme", index, "law"))
             raise ProblemError(f"the law {table.type!r} needs a [funnel] table, and the file has none", place)
+        if funnel.signal != "mrp":
+            place = describe(path, text, ("funnel", "signal"))
+            raise ProblemError(f"the law {table.type!r} tracks the attitude; its funnel must be on mrp", place)
         gains["funnel"] = funnel.bounds
     limit, thrusters = model.torque_limit_N_m, craft.thrusters
+    weakness = np.linalg.svd(np.array(thought.thrusters.effectiveness), compute_uv=False)
+    if len(weakness) < 3 or weakness[2] < 1e-9 * weakness[0]:
+        place = describe(path, text, ("spacecraft", "thrusters"))
+        raise ProblemError("the thrusters make no torque about some axis; add or turn one", place)
     count = thought.thrusters.count
     actuation = Actuation(
         effectiveness=thought.thrusters.effectiveness,
@@ -189,14 +199,14 @@ def _scheme(
         rate=thrusters.max_force_rate_N_per_s or float("inf"),
         limit_below=[-value for value in limit],
         limit_above=limit,
-        allocator=_allocator(model.allocation, thrusters, thought, timing),
+        allocator=_allocator(model.allocation, thrusters, thought),
     )
     return Scheme(
         model.name, law(body=body, hold=hold, printed=frozenset(named), **gains), actuation, model.feedback, model.title
     )
 
 
-def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft, timing: Timing) -> Any:
+def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft) -> Any:
     if isinstance(model, schema.PinvModel):
         return PseudoInverse(thought.thrusters.effectiveness)
     half = model.centre_of_mass_error_m
@@ -206,9 +216,8 @@ def _allocator(model: Any, thrusters: schema.Thrusters, thought: _Craft, timing:
         ([-value for value in half], half),
         lower=thrusters.min_force_N,
         upper=thrusters.max_force_N,
-        max_step=(thrusters.max_force_rate_N_per_s or np.inf) * timing.sample_period,
         effort_weight=model.effort_weight,
         change_weight=model.change_weight,
         accuracy_weight=model.accuracy_weight,
     )
-    return SolverInFlight(problem, model.backend)
+    return OnlineInFlight(problem) if model.backend == "online" else SolverInFlight(problem, model.backend)

@@ -15,10 +15,11 @@ import jinja2
 import numpy as np
 
 from casadi_gnc import assets, compilers
-from casadi_gnc.allocation import Allocate
+from casadi_gnc.allocation import Allocate, OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
 from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.missions.tapes import Tapes
+from casadi_gnc.status import StepStatus
 
 
 @dataclass(eq=False)
@@ -37,6 +38,10 @@ class Engine(Protocol):
 
     name: str
 
+    def first_memory(self, y: np.ndarray) -> np.ndarray:
+        """Return the law's memory at the first measurement."""
+        ...
+
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly `samples` samples from number `first`, filling rows of `record`; return the count flown."""
         ...
@@ -46,7 +51,7 @@ class _Flight(ctypes.Structure):
     _fields_ = [(name, ctypes.c_void_p) for name in ("x", "m", "force", "good", "tally", "record")] + [
         (name, ctypes.c_long) for name in ("first", "samples", "decimation")
     ]
-    _fields_ += [("allocator", ctypes.c_void_p)]
+    _fields_ += [(name, ctypes.c_void_p) for name in ("allocator", "allocation_data", "allocation_work")]
 
 
 _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 7)
@@ -77,7 +82,9 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         substeps=timing.substeps,
         period=c_constant(timing.sample_period),
         symbolic=tapes.symbolic,
-        export="",
+        online=isinstance(scheme.actuation.allocator, OnlineInFlight),
+        inexact=StepStatus.ALLOCATION_INEXACT.value,
+        failed=StepStatus.ALLOCATION_FAILED.value,
         tapes=[print_function(tape, maths=maths) for tape in tapes.functions.values()],
     )
 
@@ -102,20 +109,32 @@ class CompiledEngine:
         self.compiler = compiler or compilers.find()
         # Builtins would let the compiler replace the C library's functions by its own folding.
         flags = (optimise, "-fno-builtin") if maths == "libm" else (optimise,)
-        include = assets.folder("codegen") / "runtime"
-        self.library = compilers.build(self.source, include=include, flags=flags, compiler=self.compiler)
-        self._fly = ctypes.CDLL(str(self.library)).gnc_fly
+        include, units = assets.folder("codegen") / "runtime", ()
+        allocator, self._online, self._solve = scheme.actuation.allocator, None, None
+        if isinstance(allocator, OnlineInFlight):
+            self._online = allocator.solver(self.compiler)
+            flags, units = (*flags, *online.flags(allocator.problem)), online.units()
+        elif not tapes.symbolic:
+            self._solve = allocator.start()
+        library = compilers.load(self.source, include=include, flags=flags, units=units, compiler=self.compiler)
+        self._start, self._fly, self._memory = library.gnc_start, library.gnc_fly, scheme.law.memory.size
         self._fly.restype, self._fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
         self._failure: BaseException | None = None
-        self._solve = None if tapes.symbolic else scheme.actuation.allocator.start()
         self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
         self._callback = _ALLOCATOR(self._allocate)
+
+    def first_memory(self, y: np.ndarray) -> np.ndarray:
+        """Return the law's memory at the first measurement."""
+        memory = np.zeros(self._memory)
+        self._start(ctypes.c_void_p(y.ctypes.data), ctypes.c_void_p(memory.ctypes.data))
+        return memory
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly in one call; an exception of the allocator (or Ctrl-C in it) is raised here."""
         columns = (carried.x, carried.m, carried.force, carried.good, carried.tally, record)
         allocator = None if self._solve is None else ctypes.cast(self._callback, ctypes.c_void_p)
-        flight = _Flight(*(column.ctypes.data for column in columns), first, samples, decimation, allocator)
+        memory = self._online.memory if self._online is not None else (None, None)
+        flight = _Flight(*(column.ctypes.data for column in columns), first, samples, decimation, allocator, *memory)
         flown = self._fly(ctypes.byref(flight))
         if self._failure is not None:
             failure, self._failure = self._failure, None
@@ -137,8 +156,8 @@ class CompiledEngine:
                 view(report, self._report)[:] = found[2]
         except BaseException as error:  # nothing may propagate through C; `run` raises it again
             self._failure = error
-            return 1
-        return 0
+            return 0
+        return 1  # ctypes answers 0 for an exception that escapes, so 0 must mean stop
 
 
 class _Tape:
@@ -175,6 +194,10 @@ class VirtualMachineEngine:
         self._states = mission.truth.state.size
         self._report = np.zeros(scheme.actuation.allocator.report.size)
         self._solve: Allocate | None = None if tapes.symbolic else scheme.actuation.allocator.start()
+
+    def first_memory(self, y: np.ndarray) -> np.ndarray:
+        """Return the law's memory at the first measurement."""
+        return self._tape["start"](y)
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly sample by sample, as the loop of `flight.c.j2` does."""

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import FlightError
+from casadi_gnc.files import write_beside
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
 
@@ -48,10 +46,7 @@ class Flight:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a signal, (K,) or (K, n)."""
-        try:
-            block = self.samples[:, self.layout.place(name)]
-        except KeyError as error:
-            raise FlightError(str(error.args[0])) from None
+        block = self.block(name)
         return block[:, 0] if block.shape[1] == 1 else block
 
     @property
@@ -64,9 +59,19 @@ class Flight:
         """All signals by name."""
         return self.layout.columns(self.samples)
 
+    def block(self, name: str) -> np.ndarray:
+        """Return a signal as (K, n), also where n is 1."""
+        try:
+            return self.samples[:, self.layout.place(name)]
+        except KeyError as error:
+            raise FlightError(str(error.args[0])) from None
+
     def unit(self, name: str) -> str:
         """Return the unit of a signal."""
-        return self.layout.signal(name).unit
+        try:
+            return self.layout.signal(name).unit
+        except KeyError as error:
+            raise FlightError(str(error.args[0])) from None
 
     def summary(self) -> dict[str, Any]:
         """Return metrics, statuses and provenance as plain data, ready for JSON."""
@@ -94,19 +99,6 @@ class Flight:
         return target
 
 
-def write_beside(target: Path, write: Callable[[Path], Any]) -> None:
-    """Call `write` on a file beside `target`, then rename it: readers never see half a file."""
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}-", suffix=target.suffix)
-    os.close(handle)
-    try:
-        write(Path(name))
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
-
-
 def save_summary(folder: Path, flights: list[Flight]) -> Path:
     """Write `summary.json` of several flights of a mission; return its path."""
     content = {"mission": flights[0].mission, "schemes": [flight.summary() for flight in flights]}
@@ -114,17 +106,3 @@ def save_summary(folder: Path, flights: list[Flight]) -> Path:
     text = json.dumps(content, indent=2, allow_nan=False) + "\n"
     write_beside(target, lambda path: path.write_text(text, encoding="utf-8"))
     return target
-
-
-def prepare_folder(folder: Path) -> Path:
-    """Return a folder that exists and can be written; raise `FlightError` before any work is done."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise FlightError(
-            f"cannot write to the output folder {str(folder)!r}: {reason}; choose another --out"
-        ) from error
-    return folder

@@ -16,12 +16,15 @@ from casadi_gnc.missions import metrics, tapes
 from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine, VirtualMachineEngine
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission, Mode, Scheme
+from casadi_gnc.status import StepStatus
 
 EngineName = Literal["c", "vm"]
 Progress = Callable[[int, int], None]
 
 #: Samples between two calls of the progress function, at most.
 _CHUNK = 50_000
+#: Bytes of a record beyond which a flight is refused.
+_LARGEST_RECORD = 4e9
 
 
 def fly(
@@ -61,9 +64,9 @@ def fly(
     chosen = mission.scheme(scheme)
     built = tapes.build(mission, chosen)
     runner, notes = _engine(mission, chosen, built, engine, maths)
-    carried = begin(mission, built)
+    carried = begin(mission, built, runner)
     total, chunk = mission.timing.samples, _CHUNK if built.symbolic else 200
-    record = np.zeros((-(-total // decimation), built.row.size))
+    record = _room(-(-total // decimation), built.row.size)
     started, flown = time.perf_counter(), 0
     while flown < total:
         count = min(chunk if progress or total > _CHUNK else total, total - flown)
@@ -83,6 +86,7 @@ def fly(
         "compiler": runner.compiler.version if isinstance(runner, CompiledEngine) else "",
     }
     period = mission.timing.sample_period
+    raised = metrics.statuses(built.tally, carried.tally)
     values = metrics.read(mission.metrics, built.tally, carried.tally, (total - 1) * period, period)
     return Flight(
         mission=mission.name,
@@ -92,20 +96,28 @@ def fly(
         samples=record,
         metrics=values,
         metric_units={metric.name: metric.unit for metric in mission.metrics},
-        statuses=metrics.statuses(built.tally, carried.tally),
+        statuses=raised,
         made=made,
         seconds=seconds,
-        notes=(*mission.warnings, *notes, *_never(mission, values)),
+        notes=(*mission.warnings, *notes, *_undefined(mission, values, raised)),
     )
 
 
-def begin(mission: Mission, built: tapes.Tapes) -> Carried:
+def _room(rows: int, columns: int) -> np.ndarray:
+    """Return the array of the record; refuse one that would not fit."""
+    if rows * columns * 8 > _LARGEST_RECORD:
+        size = rows * columns * 8 / 1e9
+        raise FlightError(f"{rows} samples of {columns} numbers need {size:.1f} GB; keep fewer by a larger decimation")
+    return np.zeros((rows, columns))
+
+
+def begin(mission: Mission, built: tapes.Tapes, runner: Engine) -> Carried:
     """Return the columns at t = 0: the mission's start, the law's first memory, actuators at rest."""
     x = np.array(mission.start, dtype=float)
     y = np.array(mission.truth.measure(0.0, ca.DM(x))).ravel()
     return Carried(
         x=x,
-        m=np.array(built.start(y)).ravel(),
+        m=runner.first_memory(y),
         force=np.zeros(mission.truth.inputs.size),
         good=y.copy(),
         tally=metrics.fresh(mission.metrics, built.tally),
@@ -124,13 +136,19 @@ def _engine(
         return VirtualMachineEngine(mission, scheme, built), (note,)
 
 
-def _never(mission: Mission, values: dict[str, float | None]) -> tuple[str, ...]:
-    """Return a sentence for every settling that did not happen."""
-    return tuple(
-        f"{metric.name}: never; at {mission.timing.duration:g} s {metric.signal} was still above {metric.threshold:g}"
-        for metric in mission.metrics
-        if values[metric.name] is None
-    )
+def _undefined(
+    mission: Mission, values: dict[str, float | None], raised: dict[StepStatus, tuple[int, float]]
+) -> tuple[str, ...]:
+    """Return a sentence for every metric that has no value."""
+    if StepStatus.DIVERGED in raised:
+        return (f"diverged at {raised[StepStatus.DIVERGED][1]:g} s: no metric of this flight has a value",)
+    end, notes = mission.timing.duration, []
+    for metric in mission.metrics:
+        if values[metric.name] is None and metric.kind == "settling":
+            notes.append(f"{metric.name}: never; at {end:g} s {metric.signal} was still above {metric.threshold:g}")
+        elif values[metric.name] is None:
+            notes.append(f"{metric.name}: none; no finite sample of {metric.signal} from {metric.after:g} to {end:g} s")
+    return tuple(notes)
 
 
 def fly_all(mission: Mission, **options: Any) -> list[Flight]:

@@ -25,9 +25,12 @@ def shipped() -> list[str]:
 def locate(problem: str | Path) -> Path:
     """Return the path of a problem given by a path or by the name of a shipped one."""
     path = Path(problem)
-    if path.is_file():
-        return path
-    name = path.with_suffix("").as_posix()
+    try:
+        if path.is_file():
+            return path
+        name = path.with_suffix("").as_posix()
+    except (OSError, ValueError) as error:
+        raise ProblemError(f"{str(problem)[:60]!r} names no file: {error}") from None
     known = shipped()
     if name.removeprefix("problems/") in known:
         return assets.folder("problems") / f"{name.removeprefix('problems/')}.toml"
@@ -40,12 +43,12 @@ def read(problem: str | Path) -> tuple[Path, str, dict[str, Any]]:
     """Return path, text and parsed content of a problem file; raise `ProblemError` on bad TOML."""
     path = locate(problem)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
     try:
         return path, text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise ProblemError(f"is not valid TOML: {error}", path.name) from error
 
 
@@ -75,14 +78,15 @@ def load(problem: str | Path) -> Mission:
     try:
         model = schema.MissionModel.model_validate(data)
     except ValidationError as error:
-        raise _explain(error, path, text, data) from None
+        raise explain(error, path, text, data, schema.MissionModel) from None
     return building.build(model, path, text)
 
 
-def _explain(error: ValidationError, path: Path, text: str, data: dict[str, Any]) -> ProblemError:
+def explain(error: ValidationError, path: Path, text: str, data: dict[str, Any], top: Any) -> ProblemError:
     """Return the first complaint of pydantic as one sentence with its place in the file."""
     problems = error.errors(include_url=False)
-    first = problems[0]
+    # A misspelled key leaves the right one missing; the misspelling is what to show.
+    first = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
     key: list[str | int] = []
     at: Any = data
     part: Any
@@ -95,7 +99,7 @@ def _explain(error: ValidationError, path: Path, text: str, data: dict[str, Any]
             continue
         key.append(part)
     if first["type"] == "extra_forbidden":
-        message = "unknown key" + _near_key(str(key[-1]), first["loc"], data)
+        message = "unknown key" + _near_key(str(key[-1]), first["loc"], top)
     elif first["type"] == "missing":
         message = "is missing"
     elif first["type"] == "value_error":
@@ -108,9 +112,9 @@ def _explain(error: ValidationError, path: Path, text: str, data: dict[str, Any]
     return ProblemError(message + more, toml_place.describe(path, text, tuple(key)))
 
 
-def _near_key(key: str, location: tuple[str | int, ...], data: dict[str, Any]) -> str:
+def _near_key(key: str, location: tuple[str | int, ...], top: Any) -> str:
     """Return a hint at the key that was probably meant."""
-    model: Any = schema.MissionModel
+    model: Any = top
     for part in location[:-1]:
         if (
             isinstance(part, str)

@@ -29,6 +29,8 @@ def check_rotation(rows: Rows) -> Rows:
 def check_inertia(rows: Rows) -> Rows:
     """Return an inertia matrix as it came; raise `ValueError` where no body can have it."""
     matrix = np.array(rows)
+    if not 1e-12 < np.abs(matrix).max() < 1e12:
+        raise ValueError(f"its largest entry is {np.abs(matrix).max():.3g} kg m^2, no spacecraft's; look at the unit")
     skew = np.abs(matrix - matrix.T).max()
     if skew > 1e-9 * np.abs(matrix).max():
         raise ValueError(f"not symmetric: entries differ from their mirror images by up to {skew:.3g} kg m^2")

@@ -16,6 +16,7 @@ however few samples are kept. Status bits are counted in the same way, and their
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -36,11 +37,11 @@ def fold(metrics: tuple[Metric, ...], row: Layout) -> tuple[Layout, ca.Function]
     """Return the layout of the tally and the function (row, tally) -> tally."""
     counts = tuple(Signal(f"count_{bit.name}") for bit in StepStatus)
     firsts = tuple(Signal(f"first_{bit.name}", 1, "s") for bit in StepStatus)
-    layout = Layout((*(Signal(metric.name) for metric in metrics), *counts, *firsts))
+    layout = Layout((*(Signal(_column(metric)) for metric in metrics), *counts, *firsts))
     sample, tally = row.symbol("row"), layout.symbol("tally")
     now, so_far = row.split(sample), layout.split(tally)
     parts: dict[str, Any] = {
-        metric.name: _next(metric, getattr(now, metric.signal), now.time, getattr(so_far, metric.name))
+        _column(metric): _next(metric, getattr(now, metric.signal), now.time, getattr(so_far, _column(metric)))
         for metric in metrics
     }
     rest = now.status
@@ -52,6 +53,11 @@ def fold(metrics: tuple[Metric, ...], row: Layout) -> tuple[Layout, ca.Function]
         parts[f"first_{bit.name}"] = ca.if_else(ca.logic_and(raised, first < 0), now.time, first)
     result = ca.cse([ca.SX(layout.pack(**parts))])
     return layout, ca.Function("tally", [sample, tally], result, ["row", "tally"], ["tallied"])
+
+
+def _column(metric: Metric) -> str:
+    """Return the name of a metric's place in the tally, apart from all others."""
+    return f"metric_{metric.name}"
 
 
 def _next(metric: Metric, signal: Any, time: Any, so_far: Any) -> Any:
@@ -67,7 +73,7 @@ def fresh(metrics: tuple[Metric, ...], layout: Layout) -> np.ndarray:
     """Return the tally before the first sample."""
     tally = np.zeros(layout.size)
     for metric in metrics:
-        tally[layout.place(metric.name)] = NEVER if metric.kind == "settling" else 0.0
+        tally[layout.place(_column(metric))] = 0.0 if metric.kind == "sample_sum" else NEVER
     for bit in StepStatus:
         tally[layout.place(f"first_{bit.name}")] = NEVER
     return tally
@@ -76,11 +82,18 @@ def fresh(metrics: tuple[Metric, ...], layout: Layout) -> np.ndarray:
 def read(
     metrics: tuple[Metric, ...], layout: Layout, tally: np.ndarray, last: float, period: float
 ) -> dict[str, float | None]:
-    """Return the values of the metrics after the sample at time `last` [s]."""
+    """Return the values of the metrics after the sample at time `last` [s].
+
+    None stands for "never" (a settling), "nowhere" (a peak after the end), and for every metric of a
+    flight that diverged: comparisons pass over what is not a number, so nothing can be said.
+    """
     values: dict[str, float | None] = {}
+    diverged = StepStatus.DIVERGED in statuses(layout, tally)
     for metric in metrics:
-        value = float(tally[layout.place(metric.name)][0])
-        if metric.kind == "settling":
+        value = float(tally[layout.place(_column(metric))][0])
+        if diverged or not math.isfinite(value) or (metric.kind == "peak" and value < 0):
+            values[metric.name] = None
+        elif metric.kind == "settling":
             # The signal was above its threshold at `value` for the last time, or never.
             settled = value + period if value >= 0 else 0.0
             values[metric.name] = settled if value < last else None

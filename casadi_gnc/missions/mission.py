@@ -4,6 +4,7 @@ schemes that could fly it.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
@@ -49,6 +50,14 @@ class Timing:
     duration: float
     substeps: int = 1
 
+    def __post_init__(self) -> None:
+        if self.mode not in ("sampled", "continuous"):
+            raise FlightError(f"mode is {self.mode!r}, expected 'sampled' or 'continuous'")
+        for name in ("sample_period", "duration", "substeps"):
+            value = getattr(self, name)
+            if not (value > 0 and value < float("inf")):
+                raise FlightError(f"{name} is {value}, expected a positive number")
+
     @property
     def samples(self) -> int:
         """Number of samples of a flight, both ends included."""
@@ -91,6 +100,10 @@ class Scheme:
     actuation: Actuation
     feedback: Feedback = "achieved"
     title: str = ""
+
+    def __post_init__(self) -> None:
+        if self.feedback not in ("achieved", "wanted"):
+            raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +166,10 @@ class Mission:
         """Return the mission with one scheme only, changed: `feedback`, or gains of its law by name."""
         scheme = self.scheme(name)
         own = {key: changes.pop(key) for key in ("feedback", "actuation", "title") if key in changes}
+        known = {field.name for field in dataclasses.fields(scheme.law)}
+        for key in changes:
+            if key not in known:
+                raise FlightError(f"scheme {scheme.name!r} has no {key!r}; its law has {', '.join(sorted(known))}")
         scheme = replace(scheme, law=replace(scheme.law, **changes), **own)
         return replace(self, schemes=(scheme,))
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc.missions.flight import Flight, write_beside
+from casadi_gnc.files import write_beside
+from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
 
 #: Okabe and Ito's colours, told apart with every kind of colour vision.
@@ -29,13 +30,13 @@ def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
     wanted and achieved with the virtual-control limit, forces with their bounds.
     """
     figure, (top, middle, bottom) = _figure(3)
-    if "funnel_upper" in flight.layout:
-        _attitude(top, flight)
+    if mission.funnel is not None:
+        _inside_funnel(top, flight, mission.funnel.signal)
     else:
         _rate(top, mission, flight)
     _torque(middle, mission, flight)
     _forces(bottom, mission, flight)
-    figure.suptitle(flight.title, fontsize=_FONT + 1, x=0.02, ha="left")
+    figure.suptitle(_plain(flight.title), fontsize=_FONT + 1, x=0.02, ha="left")
     bottom.set_xlabel("time [s]")
     return _save(figure, folder / f"{flight.scheme}.png")
 
@@ -49,7 +50,9 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
     funnel = mission.funnel is not None
     for colour, flight in zip(COLOURS, flights, strict=False):
         size = flight["funnel_use"] if funnel else np.abs(flight["rate"]).max(axis=1)
-        axes.semilogy(*_thin(flight.time, np.maximum(size, 1e-9)), color=colour, label=flight.title, linewidth=1.8)
+        axes.semilogy(
+            *_thin(flight.time, np.maximum(size, 1e-9)), color=colour, label=_plain(flight.title), linewidth=1.8
+        )
     thresholds = [m.threshold for m in mission.metrics if m.kind == "settling" and m.signal == "rate"]
     for level, text in (
         [(1.0, "wall of the funnel")] if funnel else [(t, f"settled below {t:g} rad/s") for t in thresholds]
@@ -57,7 +60,7 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
         axes.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=text)
     axes.set_ylabel("share of the funnel used [-]" if funnel else "largest |rate| [rad/s]")
     axes.set_xlabel("time [s]")
-    axes.set_title(mission.title, fontsize=_FONT + 1, loc="left")
+    axes.set_title(_plain(mission.title), fontsize=_FONT + 1, loc="left")
     figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)
     return _save(figure, folder / "comparison.png")
 
@@ -82,6 +85,11 @@ def _legend(axes: Any, columns: int) -> None:
         ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 0.98), fontsize=_FONT - 1, frameon=False,
         handlelength=1.4, columnspacing=1.2, borderaxespad=0.1,
     )  # fmt: skip
+
+
+def _plain(text: str) -> str:
+    """Return text that matplotlib does not take for mathematics."""
+    return text.replace("$", r"\$")
 
 
 def _thin(time: np.ndarray, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,15 +124,15 @@ def _rate(axes: Any, mission: Mission, flight: Flight) -> None:
     _legend(axes, 3)
 
 
-def _attitude(axes: Any, flight: Flight) -> None:
-    _lines(axes, flight.time, flight["mrp"], ("x", "y", "z"))
+def _inside_funnel(axes: Any, flight: Flight, signal: str) -> None:
+    _lines(axes, flight.time, flight[signal], ("x", "y", "z"))
     for i in range(3):
         for wall in ("funnel_lower", "funnel_upper"):
             axes.plot(*_thin(flight.time, flight[wall][:, i]), color=COLOURS[i], linestyle="--", linewidth=0.9)
     axes.plot([], [], color="0.3", linestyle="--", linewidth=0.9, label="funnel")
     axes.set_yscale("symlog", linthresh=1e-3)
     axes.set_ylim(-1, 1)
-    axes.set_ylabel("attitude MRP [-]")
+    axes.set_ylabel("attitude MRP [-]" if signal == "mrp" else f"{signal} [{flight.unit(signal)}]")
     _legend(axes, 4)
 
 
@@ -145,7 +153,7 @@ def _torque(axes: Any, mission: Mission, flight: Flight) -> None:
 
 def _forces(axes: Any, mission: Mission, flight: Flight) -> None:
     """Draw every actuator as a row whose brightness is its force, from its lowest to its highest bound."""
-    force = flight["force"] * 1e3
+    force = flight.block("force") * 1e3
     stretch = max(1, len(force) // 700)
     whole = len(force) // stretch * stretch
     mean = force[:whole].reshape(-1, stretch, force.shape[1]).mean(axis=1)

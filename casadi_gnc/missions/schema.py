@@ -10,8 +10,10 @@ from __future__ import annotations
 import dataclasses
 from typing import Annotated, Any, Literal, Union
 
-from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator, model_validator
+import casadi as ca
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, field_validator, model_validator
 
+from casadi_gnc import attitude
 from casadi_gnc.laws import LAWS, Law, gains_of
 from casadi_gnc.missions import matrices
 
@@ -23,10 +25,19 @@ NonNegative = Annotated[float, Field(ge=0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,62}$", description="letters, digits and _")]
 
 
-class Part(BaseModel):
-    """Base of all parts of a file: unknown keys, infinities and NaN are refused."""
+def _is_one(value: Any) -> Any:
+    if value is not True and value == 1:
+        return value
+    raise ValueError(f"format is {value!r}; this version reads format 1")
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+Format = Annotated[Literal[1], BeforeValidator(_is_one)]
+
+
+class Part(BaseModel):
+    """Base of all parts of a file: unknown keys, infinities, NaN and numbers as text are refused."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
 
 class Orientation(Part):
@@ -45,6 +56,15 @@ class Orientation(Part):
         if self.rotation is not None and self.rotation_321_rad is not None:
             raise ValueError("rotation and rotation_321_rad are both given; keep one")
         return self
+
+
+def orientation(model: Orientation) -> ca.DM | None:
+    """Return the rotation that a table gives, (3, 3), or None if it gives none."""
+    if model.rotation is not None:
+        return ca.DM(model.rotation)
+    if model.rotation_321_rad is not None:
+        return attitude.frame_rotation(*model.rotation_321_rad)
+    return None
 
 
 class Engine(Part):
@@ -194,7 +214,7 @@ class TimingModel(Part):
     @model_validator(mode="after")
     def _whole(self) -> TimingModel:
         samples = self.duration_s / self.sample_period_s
-        if abs(samples - round(samples)) > 1e-6 * samples or samples > 1e9:
+        if not samples <= 1e9 or abs(samples - round(samples)) > 1e-6 * samples:
             raise ValueError(f"duration_s / sample_period_s is {samples:.6g}; expected a whole number up to 1e9")
         return self
 
@@ -209,8 +229,10 @@ class RobustModel(Part):
     """Robust min-max allocation against errors of the centre of mass."""
 
     method: Literal["robust"]
-    backend: Literal["clarabel"] = "clarabel"
-    centre_of_mass_error_m: Vector = Field(description="half width of the box of errors, chaser frame")
+    backend: Literal["online", "clarabel"] = Field(default="online", description="online: the on-board solver, in C")
+    centre_of_mass_error_m: Annotated[list[NonNegative], Field(min_length=3, max_length=3)] = Field(
+        description="half width of the box of errors, chaser frame"
+    )
     accuracy_weight: Positive = Field(default=1e6, description="h, weight of the squared torque error")
     effort_weight: NonNegative = Field(default=1.0, description="diagonal of M1")
     change_weight: NonNegative = Field(default=1.0, description="diagonal of M2")
@@ -260,14 +282,20 @@ class MetricModel(Part):
     name: Name
     kind: Literal["settling", "peak", "sample_sum"]
     signal: str
-    threshold: NonNegative = 0.0
-    after_s: NonNegative = 0.0
+    threshold: Positive | None = Field(default=None, description="of a settling: the signal stays below it")
+    after_s: NonNegative = Field(default=0.0, description="of a peak: from this time on")
+
+    @model_validator(mode="after")
+    def _complete(self) -> MetricModel:
+        if (self.kind == "settling") != (self.threshold is not None):
+            raise ValueError("a settling, and nothing else, takes a threshold")
+        return self
 
 
 class MissionModel(Part):
     """A mission file."""
 
-    format: Literal[1]
+    format: Format
     kind: Literal["mission"]
     title: str = ""
     source: str = ""
@@ -280,6 +308,14 @@ class MissionModel(Part):
     timing: TimingModel
     scheme: Annotated[list[SchemeModel], Field(min_length=1)]
     metric: list[MetricModel] = []
+
+    @field_validator("scheme")
+    @classmethod
+    def _names_of_files(cls, value: list[Any]) -> list[Any]:
+        for item in value:
+            if item.name.lower() in ("comparison", "summary"):
+                raise ValueError(f"a scheme cannot be named {item.name!r}: a file of the results is called so")
+        return value
 
     @field_validator("scheme", "metric")
     @classmethod

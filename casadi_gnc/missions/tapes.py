@@ -5,6 +5,7 @@
 ========  =====================================================================================
 tape      from -> to
 ========  =====================================================================================
+start     y -> m, the law's memory at the first measurement
 sense     t, x -> y
 before    t, y, good, m, force -> accepted, m, wanted, limited, lower, upper, flags
 allocate  limited, force, lower, upper -> force              (where the allocation is symbolic)
@@ -30,6 +31,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc import bounds
+from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import advance
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.mission import Mission, Scheme
@@ -47,7 +49,6 @@ class Tapes:
     """Hold the functions of one mission, scheme and mode, and the layouts of their columns."""
 
     functions: dict[str, ca.Function]
-    start: ca.Function
     row: Layout
     tally: Layout
     symbolic: bool
@@ -77,6 +78,14 @@ class Symbols:
 def function(name: str, inputs: dict[str, Any], outputs: dict[str, Any]) -> ca.Function:
     """Return an SX function with named dense ports, common subexpressions merged."""
     results = ca.cse([ca.densify(ca.SX(value)) for value in outputs.values()])
+    free = [
+        s for s in ca.symvar(ca.vertcat(*map(ca.vec, results))) if not ca.depends_on(ca.vertcat(*inputs.values()), s)
+    ]
+    if free:
+        raise FlightError(
+            f"{', '.join(s.name() for s in free)} is a symbol, not a number; numbers fly, and "
+            "closed_loop(parameters=[...]) takes symbols for analysis"
+        )
     return ca.Function(name, list(inputs.values()), results, list(inputs), list(outputs))
 
 
@@ -96,9 +105,19 @@ def accept(mission: Mission, y: Any, good: Any) -> tuple[Any, Any]:
         rows = layout.place(signal.name)
         limit = min(signal.limit, 1e150)
         credible = bounds.all_of(ca.fabs(y[rows]) <= limit)
-        accepted.append(ca.if_else(credible, y[rows], good[rows]))
+        # Before there is a good value, or if it was lost, zero is the last resort.
+        last = ca.if_else(ca.fabs(good[rows]) <= limit, good[rows], 0.0)
+        accepted.append(ca.if_else(credible, y[rows], last))
         flag = ca.logic_or(flag, ca.logic_not(credible))
     return ca.vertcat(*accepted), flag
+
+
+def _sound_memory(law: Any, t: Any, seen: Any, m: Any) -> tuple[Any, Any]:
+    """Return the memory, or a fresh one where some of it is not credible, and a flag for that."""
+    if not law.memory.size:
+        return m, ca.SX(0)
+    sound = bounds.all_of(ca.fabs(m) <= CREDIBLE)
+    return ca.if_else(sound, m, ca.SX(law.start(t, seen))), ca.logic_not(sound)
 
 
 def achieved(scheme: Scheme, limited: Any, force: Any) -> Any:
@@ -113,21 +132,25 @@ def before(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
     law, actuation = scheme.law, scheme.actuation
     accepted, replaced = accept(mission, s.y, s.good)
     seen = law_inputs(mission, scheme, accepted)
-    memory = law.jump(s.t, seen, s.m)
-    wanted = law.command(s.t, seen, memory)
+    kept, lost = _sound_memory(law, s.t, seen, s.m)
+    memory = law.jump(s.t, seen, kept)
+    asked = law.command(s.t, seen, memory)
+    wanted = ca.if_else(ca.fabs(asked) <= CREDIBLE, asked, 0.0)
     below, above = ca.DM(actuation.limit_below), ca.DM(actuation.limit_above)
     limited = bounds.clip(wanted, below, above)
     flags = {
         StepStatus.MEASUREMENT_REPLACED: replaced,
         StepStatus.COMMAND_LIMITED: bounds.outside(wanted, below, above),
+        StepStatus.MEMORY_RESET: lost,
+        StepStatus.COMMAND_REPLACED: ca.logic_not(bounds.all_of(ca.fabs(asked) <= CREDIBLE)),
         **law.status(s.t, seen, memory),
     }
     lower, upper = ca.SX(ca.DM(actuation.lower)), ca.SX(ca.DM(actuation.upper))
     if actuation.rate < float("inf"):
+        # Clipped to the amplitude box, which wins where a previous force lies outside it.
         reach = actuation.rate * mission.timing.sample_period
-        lower, upper = bounds.maximum(lower, s.force - reach), bounds.minimum(upper, s.force + reach)
-        # A previous force outside the amplitude box must not turn the box inside out.
-        lower, upper = bounds.minimum(lower, ca.DM(actuation.upper)), bounds.maximum(upper, ca.DM(actuation.lower))
+        least, most = bounds.clip(s.force - reach, lower, upper), bounds.clip(s.force + reach, lower, upper)
+        lower, upper = least, most
     return {
         "accepted": accepted,
         "memory": memory,
@@ -246,8 +269,8 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
     row = row_layout(mission, scheme)
     tally, fold = metrics.fold(mission.metrics, row)
     tapes["tally"] = fold
-    start = function("start", {"y": s.y}, {"m": law.start(ca.SX(0), seen)})
-    return Tapes(tapes, start, row, tally, scheme.actuation.is_symbolic)
+    tapes["start"] = function("start", {"y": s.y}, {"m": law.start(ca.SX(0), seen)})
+    return Tapes(tapes, row, tally, scheme.actuation.is_symbolic)
 
 
 def _integrator(size: int, h: float) -> dict[str, ca.Function]:

@@ -5,8 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path as FilePath
 
-_TABLE = re.compile(r"^\s*(\[\[?)\s*([A-Za-z0-9_.\-\" ]+?)\s*\]\]?\s*(#.*)?$")
-_KEY = re.compile(r"^\s*([A-Za-z0-9_.\-\"]+)\s*=")
+_NAME = r"(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')"
+_DOTTED = rf"{_NAME}(?:\s*\.\s*{_NAME})*"
+_TABLE = re.compile(rf"^\s*(\[\[?)\s*({_DOTTED})\s*\]\]?\s*(#.*)?$")
+_KEY = re.compile(rf"^\s*({_DOTTED})\s*=")
+#: What may hold brackets that are none: strings of one line, and comments.
+_QUIET = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'|#.*")
 
 Path = tuple[str | int, ...]
 
@@ -20,17 +24,20 @@ def lines_of(text: str) -> dict[Path, int]:
     places: dict[Path, int] = {}
     counts: dict[Path, int] = {}
     table: Path = ()
-    depth = 0
+    depth, fence = 0, ""
     for number, line in enumerate(text.splitlines(), 1):
-        header = _TABLE.match(line) if depth == 0 else None
-        if header:
+        if fence:  # inside a string of several lines
+            if fence not in line:
+                continue
+            line, fence = line.split(fence, 1)[1], ""
+        elif depth == 0 and (header := _TABLE.match(line)):
             table = _table_path(header[2], header[1] == "[[", counts)
             places.setdefault(table, number)
             continue
-        key = _KEY.match(line) if depth == 0 else None
-        if key:
+        elif depth == 0 and (key := _KEY.match(line)):
             places.setdefault(table + tuple(_names(key[1])), number)
-        bare = re.sub(r'"[^"]*"|#.*', "", line)
+        line, fence = _without_long_strings(line)
+        bare = _QUIET.sub("", line)
         depth = max(0, depth + sum(bare.count(c) for c in "[{") - sum(bare.count(c) for c in "]}"))
     return places
 
@@ -51,8 +58,21 @@ def describe(path: FilePath, text: str, key: Path) -> str:
     return ", ".join(filter(None, (path.name, f"line {line}" if line else "", dotted)))
 
 
+def _without_long_strings(line: str) -> tuple[str, str]:
+    """Return the line without strings in triple quotes, and the quotes of one left open."""
+    while True:
+        starts = [(line.find(quotes), quotes) for quotes in ('"""', "'''") if quotes in line]
+        if not starts:
+            return line, ""
+        at, quotes = min(starts)
+        end = line.find(quotes, at + 3)
+        if end < 0:
+            return line[:at], quotes
+        line = line[:at] + line[end + 3 :]
+
+
 def _names(dotted: str) -> list[str]:
-    return [part.strip().strip('"') for part in dotted.split(".")]
+    return [part.strip("\"'") for part in re.findall(_NAME, dotted)]
 
 
 def _table_path(dotted: str, is_array: bool, counts: dict[Path, int]) -> Path:

@@ -52,7 +52,7 @@ def compiled(maths: str) -> Callable[[], np.ndarray]:
         engine.run(begin_copy(), 0, SAMPLES, 1, record)
         return record[:, built.row.place("rate")]
 
-    fresh = begin(MISSION, built)
+    fresh = begin(MISSION, built, engine)
 
     def begin_copy():
         return type(fresh)(*(getattr(fresh, name).copy() for name in ("x", "m", "force", "good", "tally")))

@@ -150,6 +150,12 @@ def test_bad_input_is_one_sentence_and_exit_2(problem, tmp_path):
 
 def test_interrupted_flight_leaves_no_half_file(tmp_path):
     run("problems", "copy", "huang2020/detumble", str(tmp_path))
+    slow = (
+        (tmp_path / "detumble.toml")
+        .read_text()
+        .replace('method = "robust",', 'method = "robust", backend = "clarabel",')
+    )
+    (tmp_path / "detumble.toml").write_text(slow.replace("duration_s = 1500.0", "duration_s = 15000.0"))
     out = tmp_path / "o"
     command = [
         sys.executable,

@@ -6,6 +6,7 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import FlightError
+from casadi_gnc.laws import advance
 
 
 def test_closed_loop_repeats_the_flight(detumble):
@@ -29,17 +30,16 @@ def test_ports_are_named(detumble):
     assert step.name_out() == ["force_next", "m_next", "good_next", "wanted", "limited", "status"]
 
 
-def test_linearised_rate_loop_has_the_designed_poles(detumble):
-    """Near rest, unsaturated and with exact actuators: observer pole e^(-beta h) and rate pole."""
-    mission = detumble.with_scheme("observer_pinv")
-    law, h = mission.scheme().law, 0.1
-    function = mission.law()
-    zero = np.zeros
-    a = ca.Function("a", function.sx_in(), [ca.jacobian(function(*function.sx_in())[0], function.sx_in()[1])])
-    slope = np.array(a(0, zero(6), zero(6), zero(3)))[:, 3:]
-    expected = -np.diag([0.49019, 1.2089, 1.2916]) * (0.4 + law.observer.through)
-    assert np.allclose(slope, expected, rtol=1e-12)
-    assert law.observer.through == pytest.approx((1 - np.exp(-27 * h)) / h)
+def test_linearised_loop_has_the_designed_poles(detumble):
+    """At rest with exact actuators and inertia: 1 - h k2, e^(-beta h) and e^(-k4 h), three of each."""
+    law, h = detumble.scheme("observer_pinv").law, 0.1
+    rate, m = ca.SX.sym("rate", 3), law.memory.symbol("m")
+    torque = law.command(0.0, rate, m)
+    moved = ca.vertcat(rate + h * law.body.acceleration(ca.DM.zeros(3), rate, torque), advance(law, 0.0, rate, m, torque, torque))
+    at = ca.Function("at", [rate, m], [ca.jacobian(moved, ca.vertcat(rate, m))])
+    # The known engine torque must be balanced for this to be a rest: it is, by the command.
+    poles = np.sort(np.linalg.eigvals(np.array(at(np.zeros(3), np.zeros(6)))).real)
+    assert np.allclose(poles, np.repeat([np.exp(-2.7), np.exp(-0.05), 1 - h * 0.4], 3), atol=1e-6)
 
 
 def test_solver_in_the_loop_has_no_closed_form(detumble):
@@ -49,19 +49,3 @@ def test_solver_in_the_loop_has_no_closed_form(detumble):
         detumble.with_timing(mode="continuous").step("observer_pinv")
     with pytest.raises(FlightError, match="no scheme 'x' in detumble; there is damping_pinv"):
         detumble.scheme("x")
-
-
-def test_bad_measurements_are_survived(detumble):
-    """NaN, infinities and huge values: last good measurement, status bit, bounded forces, recovery."""
-    step = detumble.step("observer_pinv")
-    good, m, force = np.array(detumble.start), np.zeros(6), np.zeros(12)
-    for bad in (np.nan, np.inf, -np.inf, 1e300, 11.0):
-        y = np.array(detumble.start)
-        y[4] = bad
-        found = step(t=0.0, y=y, good=good, m=m, force=force)
-        assert int(found["status"]) & 1
-        assert np.array_equal(np.array(found["good_next"]).ravel(), good)
-        forces = np.array(found["force_next"])
-        assert np.all((forces >= 0) & (forces <= 3.75e-3))
-        assert np.all(np.isfinite(np.array(found["m_next"])))
-    assert not int(step(t=0.0, y=good, good=good, m=m, force=force)["status"]) & 1

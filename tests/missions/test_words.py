@@ -48,7 +48,7 @@ def flown(mission, scheme, compiler: compilers.Compiler, optimise: str, maths="g
     chosen = mission.scheme(scheme)
     built = tapes.build(mission, chosen)
     engine = CompiledEngine(mission, chosen, built, maths, compiler=compiler, optimise=optimise)
-    carried = begin(mission, built)
+    carried = begin(mission, built, engine)
     record = np.zeros((mission.timing.samples, built.row.size))
     assert engine.run(carried, 0, mission.timing.samples, 1, record) == mission.timing.samples
     return record

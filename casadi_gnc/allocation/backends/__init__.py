@@ -1,9 +1,10 @@
 """Back ends: one file each, found by name, imported when first used.
 
-A back end is a module with
+A back end is a module, or a `BackEnd` in one, with
 
 * `CAPABILITIES`: what it can do, of `Capability`;
-* `REQUIRES`: the packages it needs beyond the core;
+* `REQUIRES`: the packages it needs, by the names they are imported under;
+* `ACCURACY`: relative gap and rounding floor (share of h |full effort|^2) that its answers keep, by test;
 * `set_up(problem, **options)`: returns an object with
   `find(command, previous, lower, upper) -> Found`, called once a sample.
 
@@ -13,6 +14,7 @@ the forces into their bounds and certifies them from the data.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Flag, auto
 from importlib import import_module, util
@@ -64,11 +66,36 @@ class Solver(Protocol):
         ...
 
 
-#: Module of each back end, by the name that users give.
+@dataclass(frozen=True, eq=False)
+class BackEnd:
+    """Hold a back end that shares its module with others; the fields are those of a module."""
+
+    CAPABILITIES: Capability
+    REQUIRES: tuple[str, ...]
+    ACCURACY: tuple[float, float]
+    set_up: Callable[..., Solver]
+
+
+#: Module of each back end, or module:object, by the name that users give.
 _HOMES = {
+    "online": "online_",
     "clarabel": "clarabel_",
+    "scs": "scs_",
+    "sdp": "sdp_",
+    "sdp_scs": "sdp_:SCS",
+    "ipopt": "nlp_",
+    "sqpmethod": "nlp_:SQPMETHOD",
+    "sqpmethod_qrqp": "nlp_:SQPMETHOD_QRQP",
+    "proxqp": "proxqp_",
+    "daqp": "daqp_",
+    "osqp": "qpsolvers_:OSQP",
+    "highs": "qpsolvers_:HIGHS",
+    "piqp": "qpsolvers_:PIQP",
+    "qpalm": "qpsolvers_:QPALM",
     "pinv": "pinv_",
 }
+#: Before the name of any solver that qpsolvers finds, whatever its licence.
+QPSOLVERS = "qpsolvers:"
 
 
 def names() -> list[str]:
@@ -77,10 +104,17 @@ def names() -> list[str]:
 
 
 def module(name: str) -> Any:
-    """Return the module of a back end; raise `AllocationError` naming what there is."""
+    """Return a back end (its module or `BackEnd`); raise `AllocationError` naming what there is."""
+    if name.startswith(QPSOLVERS):
+        return import_module(f"{__name__}.qpsolvers_").back_end(name.removeprefix(QPSOLVERS))
     if name not in _HOMES:
-        raise AllocationError(f"no allocation back end {name!r}; there is {', '.join(names())}")
-    return import_module(f"{__name__}.{_HOMES[name]}")
+        raise AllocationError(
+            f"no allocation back end {name!r}; there is {', '.join(names())}, "
+            f"and {QPSOLVERS}NAME for any solver that qpsolvers finds"
+        )
+    home, _, attribute = _HOMES[name].partition(":")
+    found = import_module(f"{__name__}.{home}")
+    return getattr(found, attribute) if attribute else found
 
 
 def missing(name: str) -> list[str]:

@@ -15,6 +15,7 @@ from casadi_gnc.allocation.problem import AllocationProblem
 
 CAPABILITIES = Capability.ROBUST | Capability.C_CODE
 REQUIRES: tuple[str, ...] = ()
+ACCURACY = (float("inf"), float("inf"))  # none
 
 
 class _PseudoInverse:

@@ -1,0 +1,46 @@
+"""`casadi-gnc attainable`: which effort the actuators can make, and with what margin."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def attainable(
+    problem: Annotated[str, typer.Argument(help="An allocation file, or the name of a shipped one.")],
+    plot: Annotated[Path | None, typer.Option(help="Draw the sets' slices into this PNG.")] = None,
+    samples: Annotated[int, typer.Option(min=0, help="Errors tried besides the corners.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Report largest box, inscribed sphere and axis margins of three attainable sets.
+
+    The sets: nominal geometry; every error with forces of its own; one choice of forces for all
+    errors. The box that the file's torque_limit_N_m asks for is judged against each.
+    """
+    from casadi_gnc.allocation.attainable import attainable as analyse
+    from casadi_gnc.files import prepare_folder
+    from casadi_gnc.missions.allocation_file import load_allocation
+
+    case = load_allocation(problem)
+    if plot is not None:
+        prepare_folder(plot.parent)
+    found = analyse(case.problem, case.torque_limit, samples=samples, seed=seed)
+    if json:
+        import json as encoder
+
+        typer.echo(encoder.dumps({"problem": case.name, **found.summary()}, indent=2))
+    else:
+        typer.echo(case.title or case.name)
+        for sentence in found.sentences("N m"):
+            typer.echo(sentence)
+        for reach in found.reaches:
+            axes = ", ".join(f"{low:.3g} to {high:.3g}" for low, high in reach.lines)
+            typer.echo(f"{reach.kind.value}: sphere {reach.sphere:.3g} N m; along the axes {axes} N m")
+    if plot is not None:
+        from casadi_gnc.allocation.attainable_plots import plot_slices
+
+        plot_slices(case.problem, plot, wanted=case.torque_limit)
+        typer.echo(f"wrote {plot}", err=json)

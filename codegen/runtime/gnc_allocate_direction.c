@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * gnc_allocate_direction.c - the Newton step for given sets of bounded actuators and active vertices.
+ *
+ *     free i:     q_i dF_i + s_i'(W dy + sum dlambda_v z_v) = -g_i           gradient to zero
+ *     bounded i:  dF_i = bound - F_i                                         follow the box
+ *     active v:   z_v'dy - dt = t - q_v,      sum dlambda_v = 0              ties stay ties
+ *
+ * The linear algebra is that of the interior point with 1/d = 1/q on free and 0 on bounded actuators:
+ *
+ *     S_free diag(1/q) S_free' = L L',    I + L' W L = C C',    T = C^-1 L'
+ *     dy = d0 - T'(T W d0 + J dlambda),   J = T Z,   d0 = S (the step without what y feeds back)
+ *
+ * L depends on the free set alone, T also on lambda, but slowly: both are kept from sample to sample,
+ * and most steps need no factorisation larger than that of the vertex weights.
+ */
+#include "gnc_allocate_internal.h"
+
+#define LAMBDA_DRIFT (real)0.1 /* change of the vertex weights that asks for a new T */
+#ifdef GNC_ALLOC_REAL_FLOAT
+#define DEPENDENT 1e-5F  /* pivot of a vertex that adds no new direction */
+#else
+#define DEPENDENT 1e-11
+#endif
+
+/* Bring L, W and T up to date with the free set and the vertex weights. */
+void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
+{
+    int i, k, l, v, e;
+    uint32_t free_set = 0;
+    real C[K][K], inverse[K], drift = 0;
+    for (i = 0; i < N; ++i) {
+        free_set |= work->side[i] ? 0U : (uint32_t)1 << i;
+    }
+    for (v = 0; v < V; ++v) {
+        drift += size_of(work->lambda[v] - work->lambda_W[v]);
+    }
+    if (work->stamp != data->stamp || work->free_set != free_set) {
+        real packed[KT] = {0};
+        for (i = 0; i < N; ++i) {
+            if (!work->side[i]) {
+                for (e = 0; e < KT; ++e) {
+                    packed[e] += data->SS[i][e] * data->inv_curvature[i];
+                }
+            }
+        }
+        for (k = 0, e = 0; k < K; ++k) {
+            for (l = 0; l <= k; ++l, ++e) {
+                work->L[k][l] = packed[e];
+            }
+        }
+        factor(&work->L[0][0], inverse, K, 4 * EPS);
+        work->stamp = data->stamp;
+        work->free_set = free_set;
+    } else if (drift <= LAMBDA_DRIFT && !always) {
+        return;
+    }
+    memcpy(work->lambda_W, work->lambda, sizeof work->lambda);
+    NAME(inner_matrix)(data, work->lambda, work->L, work->W, C);
+    factor(&C[0][0], inverse, K, 0);
+    for (k = 0; k < K; ++k) {
+        real row[K];
+        for (l = 0; l < K; ++l) {
+            row[l] = work->L[l][k];
+        }
+        for (i = 0; i < k; ++i) {
+            for (l = 0; l < K; ++l) {
+                row[l] -= C[k][i] * work->T[i][l];
+            }
+        }
+        for (l = 0; l < K; ++l) {
+            work->T[k][l] = work->Tt[l][k] = row[l] * inverse[k];
+        }
+    }
+}
+
+/* out = A in, A given by its columns: one multiplication and addition for all rows at once */
+static void multiply(real (*column)[K], const real *in, real *out)
+{
+    int k, l;
+    real sum[K] = {0};
+    for (l = 0; l < K; ++l) {
+        for (k = 0; k < K; ++k) {
+            sum[k] += column[l][k] * in[l];
+        }
+    }
+    memcpy(out, sum, sizeof sum);
+}
+
+/* Inner product in two halves, which do not wait for each other. */
+static real product(const real *a, const real *b)
+{
+    real even = 0, odd = 0;
+    int k;
+    for (k = 0; k + 1 < K; k += 2) {
+        even += a[k] * b[k];
+        odd += a[k + 1] * b[k + 1];
+    }
+    return K % 2 ? even + odd + a[K - 1] * b[K - 1] : even + odd;
+}
+
+static void list_vertices(vertices_t *vert, const workspace_t *work, const data_t *data, const point_t *point)
+{
+    int a, k, j, v;
+    vert->count = 0;
+    for (v = 0; v < V && vert->count < A; ++v) {
+        if (work->active[v]) {
+            vert->list[vert->count] = v;
+            if (work->lambda[v] > work->lambda[vert->list[0]]) {
+                vert->list[vert->count] = vert->list[0];
+                vert->list[0] = v;
+            }
+            ++vert->count;
+        }
+    }
+    for (a = 0; a < vert->count; ++a) {
+        real z[K] = {0};
+        v = vert->list[a];
+        for (k = 0; k < R; ++k) {
+            z[k] = point->r[k][v];
+            for (j = 0; j < P; ++j) {
+                z[R + j] += data->Dv[v][k][j] * z[k];
+            }
+        }
+        memcpy(vert->z[a], z, sizeof z);
+    }
+}
+
+/* List the active vertices and factor their system. Return 0, or the place in the list of the first
+ * vertex that depends on those before it. */
+int NAME(factor_vertices)(vertices_t *vert, workspace_t *work, const data_t *data, const point_t *point)
+{
+    int a, b, k;
+    list_vertices(vert, work, data, point);
+    for (a = 0; a < vert->count; ++a) {
+        multiply(work->Tt, vert->z[a], vert->J[a]);
+    }
+    for (a = 1; a < vert->count; ++a) {
+        real diagonal, pivot, raw[A];
+        for (k = 0; k < K; ++k) {
+            vert->J[a][k] -= vert->J[0][k];
+        }
+        diagonal = product(vert->J[a], vert->J[a]);
+        pivot = diagonal;
+        for (b = 1; b < a; ++b) {
+            real entry = product(vert->J[a], vert->J[b]);
+            for (k = 1; k < b; ++k) {
+                entry -= raw[k] * vert->G[b][k];
+            }
+            raw[b] = entry;
+            vert->G[a][b] = entry * vert->inv_G[b];
+            pivot -= entry * vert->G[a][b];
+        }
+        if (pivot <= DEPENDENT * diagonal + TINY) {
+            return a;
+        }
+        vert->inv_G[a] = 1 / pivot;
+    }
+    return 0;
+}
+
+/* The full step. An empty list of vertices means: hold the vertex weights as they are. */
+void NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
+                       const command_t *command, const point_t *point)
+{
+    int i, k, a, b, j, v;
+    const int n = vert->count;
+    const real t = n > 0 ? point->q[vert->list[0]] : point->worst;
+    real d0[K] = {0}, eps[K], dy[K], nu[K], dlambda[A], dt = 0;
+    for (i = 0; i < N; ++i) {
+        const real bound = work->side[i] < 0 ? command->lower[i] : command->upper[i];
+        const real d = work->side[i] ? bound - work->force[i] : -data->inv_curvature[i] * point->g[i];
+        goal->force[i] = d;
+        for (k = 0; k < K; ++k) {
+            d0[k] += data->St[i][k] * d;
+        }
+    }
+    multiply(work->W, d0, nu);
+    multiply(work->Tt, nu, eps);
+    /* vertex weights: what each tie lacks compared with the first, through the factors of G */
+    dlambda[0] = 0;
+    if (n > 0) {
+        dt = product(vert->z[0], d0) - product(vert->J[0], eps);
+    }
+    for (a = 1; a < n; ++a) {
+        dlambda[a] = point->q[vert->list[a]] - t - product(vert->J[a], eps);
+        for (k = 0; k < K; ++k) {
+            dlambda[a] += (vert->z[a][k] - vert->z[0][k]) * d0[k];
+        }
+        for (b = 1; b < a; ++b) {
+            dlambda[a] -= vert->G[a][b] * dlambda[b];
+        }
+    }
+    for (a = 1; a < n; ++a) {
+        dlambda[a] *= vert->inv_G[a];
+    }
+    for (a = n - 1; a >= 1; --a) {
+        for (b = 1; b < a; ++b) {
+            dlambda[b] -= vert->G[a][b] * dlambda[a];
+        }
+        dlambda[0] -= dlambda[a];
+        dt -= product(vert->J[0], vert->J[a]) * dlambda[a];
+        for (k = 0; k < K; ++k) {
+            eps[k] += vert->J[a][k] * dlambda[a];
+        }
+    }
+    multiply(work->T, eps, dy);
+    for (k = 0; k < K; ++k) {
+        dy[k] = d0[k] - dy[k];
+    }
+    multiply(work->W, dy, nu);
+    memcpy(goal->lambda, work->lambda, sizeof goal->lambda);
+    for (a = 0; a < n; ++a) {
+        for (k = 0; k < K; ++k) {
+            nu[k] += vert->z[a][k] * dlambda[a];
+        }
+        goal->lambda[vert->list[a]] += dlambda[a];
+    }
+    for (i = 0; i < N; ++i) {
+        real g = point->g[i];
+        for (k = 0; k < K; ++k) {
+            g += data->S[k][i] * nu[k];
+        }
+        goal->bound[i] = work->side[i] ? g + data->q[i] * goal->force[i] : 0;
+        goal->force[i] = work->force[i] + (work->side[i] ? goal->force[i] : -g * data->inv_curvature[i]);
+    }
+    for (v = 0; v < V; ++v) {
+        goal->slack[v] = t + dt - point->q[v];
+    }
+    for (a = 0; a < R; ++a) {
+        for (v = 0; v < V; ++v) {
+            real move = dy[a];
+            for (j = 0; j < P; ++j) {
+                move += data->D[a][j][v] * dy[R + j];
+            }
+            goal->slack[v] -= move * point->r[a][v];
+        }
+    }
+}

@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * gnc_allocate_interior_point.c - the base method: primal-dual interior point in K = R + P numbers.
+ *
+ *     minimise  sum (q_i F_i^2/2 + c_i F_i) + t    subject to  lo <= F <= hi,  s_v = t - q_v(y) >= 0
+ *
+ * with multipliers zl, zu of the box and lambda of the vertices; a predictor and a corrector step per
+ * iteration (Mehrotra), one step length for all unknowns. The linear algebra is in
+ * gnc_allocate_interior_step.c.
+ *
+ * The slack is never an unknown of its own: s_v = t - q_v is recomputed from F, and because it is an
+ * exact quadratic along a step, the step to its boundary is exact too.
+ */
+#include "gnc_allocate_internal.h"
+
+enum { MAX_ITERATIONS = 30 };
+#define SHORT_STEP (real)0.1 /* a step this short did not pay: centre instead */
+#define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
+                              * easy problems and loses the way in degenerate ones */
+
+/* ---- one step ---------------------------------------------------------------------------------- */
+
+/* Longest step, at most 1, that keeps a little of every room and multiplier. */
+static real step_length(const direction_t *dir, const iterate_t *it)
+{
+    int i, v;
+    real ratio = 0;
+    for (i = 0; i < N; ++i) {
+        ratio = larger(ratio, larger(-dir->F[i] / it->down[i], dir->F[i] / it->up[i]));
+        if (it->zl[i] > 0) {
+            ratio = larger(ratio, larger(-dir->zl[i] / it->zl[i], -dir->zu[i] / it->zu[i]));
+        }
+    }
+    for (v = 0; v < V; ++v) {
+        const real root = SQUARE_ROOT(dir->rise[v] * dir->rise[v] + 4 * it->s[v] * dir->bend[v]);
+        ratio = larger(ratio, larger(-dir->lambda[v] / it->lambda[v], (root - dir->rise[v]) / (2 * it->s[v])));
+    }
+    return BACK_OFF < ratio ? BACK_OFF / ratio : 1;
+}
+
+/* Aim at equal products mu, less the cross terms that the last direction predicts if second_order is 1,
+ * and with the loss of slack on a step of that length. */
+static void aim(target_t *target, const direction_t *dir, const command_t *command, real mu, real step,
+                real second_order)
+{
+    int i, v;
+    for (i = 0; i < N; ++i) {
+        const real cross = second_order * dir->zl[i] * dir->F[i], cross_up = second_order * dir->zu[i] * dir->F[i];
+        target->zl[i] = command->dead[i] ? 0 : mu - cross;
+        target->zu[i] = command->dead[i] ? 0 : mu + cross_up;
+    }
+    for (v = 0; v < V; ++v) {
+        target->lambda[v] = mu - second_order * dir->lambda[v] * dir->rise[v];
+        target->bend[v] = step * step * dir->bend[v];
+    }
+}
+
+/* Where the products would be after a step: mean only. */
+static real mean_product(const direction_t *dir, const iterate_t *it, real step, int products)
+{
+    int i, v;
+    real sum = 0;
+    for (i = 0; i < N; ++i) {
+        sum += (it->zl[i] + step * dir->zl[i]) * (it->down[i] + step * dir->F[i]);
+        sum += (it->zu[i] + step * dir->zu[i]) * (it->up[i] - step * dir->F[i]);
+    }
+    for (v = 0; v < V; ++v) {
+        sum += (it->lambda[v] + step * dir->lambda[v]) *
+               (it->s[v] + step * dir->rise[v] - step * step * dir->bend[v]);
+    }
+    return sum / (real)products;
+}
+
+/* ---- the iteration ------------------------------------------------------------------------------ */
+
+/* Centre of the box, equal weights, equal products. */
+static int start(iterate_t *it, real *force, const data_t *data, const command_t *command, point_t *point)
+{
+    int i, v, products = V;
+    real mu = 0;
+    for (i = 0; i < N; ++i) {
+        it->down[i] = (real)0.5 * (command->upper[i] - command->lower[i]);
+        it->up[i] = it->down[i];
+        force[i] = command->lower[i] + it->down[i];
+        if (command->dead[i]) {
+            force[i] = command->lower[i];
+            it->down[i] = it->up[i] = 1;
+        }
+    }
+    NAME(residuals)(data, command, force, point);
+    it->t = larger(2 * point->worst, command->floor) + TINY;
+    for (v = 0; v < V; ++v) {
+        it->lambda[v] = 1 / (real)(int)V;
+        it->s[v] = it->t - point->q[v];
+        mu += it->s[v] / (real)(V * V);
+    }
+    for (i = 0; i < N; ++i) {
+        it->zl[i] = command->dead[i] ? 0 : mu / it->down[i];
+        it->zu[i] = it->zl[i];
+        products += command->dead[i] ? 0 : 2;
+    }
+    return products;
+}
+
+/* A first answer: stay at the previous forces. At rest (u = 0, Fp = 0) it is exactly optimal, while no
+ * interior iterate ever is. */
+static void rest(workspace_t *work, const data_t *data, const command_t *command, const real *lambda,
+                 point_t *point)
+{
+    int i;
+    for (i = 0; i < N; ++i) {
+        work->force[i] = larger(command->lower[i], smaller(command->upper[i], command->previous[i]));
+    }
+    memcpy(work->lambda, lambda, sizeof work->lambda);
+    NAME(evaluate)(data, command, work->force, work->lambda, point);
+}
+
+/* Record the point for the caller and for the next warm start. */
+static void keep(workspace_t *work, const data_t *data, const iterate_t *it, const point_t *point)
+{
+    int i, v;
+    for (i = 0; i < N; ++i) {
+        /* at a bound if the multiplier outweighs what the weights' curvature does with the room */
+        work->side[i] = it->zl[i] > data->q[i] * it->down[i] && it->down[i] < it->up[i]   ? -1
+                        : it->zu[i] > data->q[i] * it->up[i] && it->up[i] < it->down[i] ? 1
+                                                                                        : 0;
+        work->bound[i] = work->side[i] ? point->g[i] : 0;
+    }
+    for (v = 0; v < V; ++v) { /* a copy hands its weight to the original */
+        const real weight = work->lambda[v];
+        work->lambda[v] = 0;
+        work->lambda[data->original[v]] += weight;
+    }
+    for (v = 0; v < V; ++v) {
+        work->slack[v] = point->worst - point->q[v];
+        work->active[v] = work->lambda[v] * larger(point->worst, TINY) > work->slack[v];
+    }
+    work->warm = 1;
+}
+
+int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t *command,
+                         point_t *point, int32_t *iterations)
+{
+    iterate_t it;
+    factors_t fac;
+    direction_t dir;
+    target_t target;
+    real force[N], best, last = -1;
+    int i, v, k;
+    const int products = start(&it, force, data, command, point);
+    rest(work, data, command, it.lambda, point);
+    best = point->gap;
+    for (k = 0; !is_optimal(data, point); ++k) {
+        real step, sigma;
+        NAME(evaluate)(data, command, force, it.lambda, point);
+        if (point->gap < best) {
+            best = point->gap;
+            memcpy(work->force, force, sizeof force);
+            memcpy(work->lambda, it.lambda, sizeof it.lambda);
+        }
+        /* Below the rounding floor go on only while the gap still falls. */
+        if (is_optimal(data, point) || k == MAX_ITERATIONS || !is_finite(point->gap) ||
+            (best <= command->floor && point->gap > (real)0.9 * last)) {
+            break;
+        }
+        last = point->gap;
+        for (v = 0; v < V; ++v) {
+            it.s[v] = larger(it.t - point->q[v], EPS * it.t);
+        }
+        NAME(interior_factors)(&fac, data, command, &it, point);
+        memset(&target, 0, sizeof target); /* predictor: all products to zero */
+        NAME(interior_direction)(&dir, &fac, &target, data, &it, point);
+        step = step_length(&dir, &it);
+        it.mu = 0;
+        for (i = 0; i < N; ++i) {
+            it.mu += it.zl[i] * it.down[i] + it.zu[i] * it.up[i];
+        }
+        for (v = 0; v < V; ++v) {
+            it.mu += it.lambda[v] * it.s[v];
+        }
+        it.mu /= (real)products;
+        sigma = mean_product(&dir, &it, step, products) / it.mu;
+        aim(&target, &dir, command, sigma * sigma * sigma * it.mu, step, 1); /* corrector */
+        NAME(interior_direction)(&dir, &fac, &target, data, &it, point);
+        step = step_length(&dir, &it);
+        if (step < SHORT_STEP) { /* some product lags far behind: no progress, back to the centre */
+            aim(&target, &dir, command, it.mu, 0, 0);
+            NAME(interior_direction)(&dir, &fac, &target, data, &it, point);
+            step = step_length(&dir, &it);
+        }
+        for (i = 0; i < N; ++i) {
+            it.down[i] += step * dir.F[i];
+            it.up[i] -= step * dir.F[i];
+            it.zl[i] += step * dir.zl[i];
+            it.zu[i] += step * dir.zu[i];
+            force[i] = command->dead[i]          ? command->lower[i]
+                       : it.down[i] < it.up[i] ? command->lower[i] + it.down[i]
+                                               : command->upper[i] - it.up[i];
+        }
+        for (v = 0; v < V; ++v) {
+            it.lambda[v] += step * dir.lambda[v];
+        }
+        it.t += step * dir.t;
+    }
+    *iterations = k;
+    if (point->gap != best) { /* an earlier iterate was better */
+        NAME(evaluate)(data, command, work->force, work->lambda, point);
+    }
+    keep(work, data, &it, point);
+    /* With the added M1 the condition is 1e9: there 1e-5 of the objective can be all that is left. */
+    return is_optimal(data, point) || point->gap <= command->floor ||
+           (data->regularised && point->gap <= (real)1e-5 * point->phi);
+}

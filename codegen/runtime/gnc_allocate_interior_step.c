@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * gnc_allocate_interior_step.c - the linear algebra of the interior point, in K = R + P numbers.
+ *
+ * All curvature besides a diagonal lies in y = S F, so a Newton step needs one K x K system for y and
+ * one V x V system for lambda:
+ *
+ *     d_i = q_i + zl/(F-lo) + zu/(hi-F)         S diag(1/d) S' = L L'
+ *     W   = sum lambda_v [I D_v]'[I D_v]        I + L' W L = C C'         (eigenvalues >= 1)
+ *     J   = C^-1 L' Z                           B = J'J + diag(s/lambda)
+ *
+ * Eliminating lambda first would leave a single K x K matrix, W + sum (lambda/s) z z', and half the
+ * work; but its condition grows with 1/s and the iteration breaks down near a gap of 1e-9.
+ */
+#include "gnc_allocate_internal.h"
+
+/* z_v = [r_v; D_v' r_v] */
+static void vertex_gradients(real (*z)[V], const data_t *data, const point_t *point)
+{
+    int a, j, v;
+    memcpy(z, point->r, sizeof point->r);
+    for (j = 0; j < P; ++j) {
+        for (v = 0; v < V; ++v) {
+            real sum = 0;
+            for (a = 0; a < R; ++a) {
+                sum += data->D[a][j][v] * point->r[a][v];
+            }
+            z[R + j][v] = sum;
+        }
+    }
+}
+
+/* The triangle U of B = diag(s/lambda) + J'J = U'U by Householder reflections of the stacked matrix
+ * [sqrt(diag); J]. Forming J'J would lose the diagonal in its rounding: with more vertices than rows of
+ * J, or with tied ones, the diagonal alone decides how weight is shared among them. */
+static void factor_B(factors_t *fac, const iterate_t *it)
+{
+    int j, k, l;
+    real left[K][V];
+    memcpy(left, fac->J, sizeof left);
+    for (j = 0; j < V; ++j) {
+        const real d2 = it->s[j] / it->lambda[j], d = SQUARE_ROOT(d2);
+        real column[K], w[V] = {0}, norm = d2, inverse;
+        for (k = 0; k < K; ++k) {
+            column[k] = left[k][j];
+            norm += column[k] * column[k];
+            for (l = 0; l < V; ++l) {
+                w[l] += column[k] * left[k][l];
+            }
+        }
+        norm = SQUARE_ROOT(norm);
+        inverse = 1 / norm;
+        fac->inv_U[j] = inverse;
+        for (l = 0; l < V; ++l) {
+            fac->U[j][l] = w[l] * inverse; /* needed for l > j only */
+        }
+        inverse = 1 / (d + norm);
+        for (k = 0; k < K; ++k) {
+            for (l = 0; l < V; ++l) {
+                left[k][l] -= fac->U[j][l] * inverse * column[k];
+            }
+        }
+    }
+}
+
+/* x <- B^-1 x */
+static void solve_B(const factors_t *fac, real *x)
+{
+    int j, l;
+    for (j = 0; j < V; ++j) {
+        x[j] *= fac->inv_U[j];
+        for (l = j + 1; l < V; ++l) {
+            x[l] -= fac->U[j][l] * x[j];
+        }
+    }
+    for (j = V - 1; j >= 0; --j) {
+        for (l = j + 1; l < V; ++l) {
+            x[j] -= fac->U[j][l] * x[l];
+        }
+        x[j] *= fac->inv_U[j];
+    }
+}
+
+void NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
+                            const iterate_t *it, const point_t *point)
+{
+    int i, k, l, v, e;
+    real packed[KT] = {0};
+    vertex_gradients(fac->z, data, point);
+    for (i = 0; i < N; ++i) {
+        const real d = data->curvature[i] + it->zl[i] / it->down[i] + it->zu[i] / it->up[i];
+        fac->invd[i] = command->dead[i] ? 0 : 1 / d;
+        for (e = 0; e < KT; ++e) {
+            packed[e] += data->SS[i][e] * fac->invd[i];
+        }
+    }
+    for (k = 0, e = 0; k < K; ++k) {
+        for (l = 0; l <= k; ++l, ++e) {
+            fac->L[k][l] = packed[e];
+        }
+    }
+    factor(&fac->L[0][0], fac->inv_L, K, 2 * EPS);
+    NAME(inner_matrix)(data, it->lambda, fac->L, fac->W, fac->C);
+    factor(&fac->C[0][0], fac->inv_C, K, 0);
+    for (k = 0; k < K; ++k) {
+        for (v = 0; v < V; ++v) {
+            fac->J[k][v] = 0;
+        }
+        for (i = k; i < K; ++i) {
+            for (v = 0; v < V; ++v) {
+                fac->J[k][v] += fac->L[i][k] * fac->z[i][v];
+            }
+        }
+        for (l = 0; l < k; ++l) {
+            for (v = 0; v < V; ++v) {
+                fac->J[k][v] -= fac->C[k][l] * fac->J[l][v];
+            }
+        }
+        for (v = 0; v < V; ++v) {
+            fac->J[k][v] *= fac->inv_C[k];
+        }
+    }
+    factor_B(fac, it);
+    for (v = 0; v < V; ++v) {
+        fac->B1[v] = 1;
+    }
+    solve_B(fac, fac->B1);
+    fac->sum_B1 = 0;
+    for (v = 0; v < V; ++v) {
+        fac->sum_B1 += fac->B1[v];
+    }
+}
+
+/* The direction towards the target products:
+ *     d dF + S'(W dy + Z dlambda) = rho,   (s/lambda) dlambda + dt - Z'dy = beta,   sum lambda = 1 */
+void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const target_t *target,
+                              const data_t *data, const iterate_t *it, const point_t *point)
+{
+    int i, k, a, j, v;
+    real rho[N], eps[K] = {0}, dy[K] = {0}, nu[K], excess = -1;
+    for (i = 0; i < N; ++i) {
+        rho[i] = -point->g[i] + target->zl[i] / it->down[i] - target->zu[i] / it->up[i];
+        for (k = 0; k < K; ++k) {
+            eps[k] += data->St[i][k] * (rho[i] * fac->invd[i]);
+        }
+    }
+    forward(&fac->L[0][0], fac->inv_L, K, eps);
+    forward(&fac->C[0][0], fac->inv_C, K, eps);
+    for (v = 0; v < V; ++v) {
+        dir->lambda[v] = target->lambda[v] / it->lambda[v] - it->s[v] + target->bend[v];
+        excess += it->lambda[v];
+    }
+    for (k = 0; k < K; ++k) {
+        for (v = 0; v < V; ++v) {
+            dir->lambda[v] += fac->J[k][v] * eps[k];
+        }
+    }
+    solve_B(fac, dir->lambda);
+    for (v = 0; v < V; ++v) {
+        excess += dir->lambda[v];
+    }
+    dir->t = excess / fac->sum_B1;
+    for (v = 0; v < V; ++v) {
+        dir->lambda[v] -= fac->B1[v] * dir->t;
+    }
+    for (k = 0; k < K; ++k) {
+        for (v = 0; v < V; ++v) {
+            eps[k] -= fac->J[k][v] * dir->lambda[v];
+        }
+    }
+    backward(&fac->C[0][0], fac->inv_C, K, eps);
+    for (k = 0; k < K; ++k) {
+        for (i = 0; i <= k; ++i) {
+            dy[k] += fac->L[k][i] * eps[i];
+        }
+    }
+    for (k = 0; k < K; ++k) {
+        nu[k] = 0;
+        for (i = 0; i < K; ++i) {
+            nu[k] += fac->W[k][i] * dy[i];
+        }
+        for (v = 0; v < V; ++v) {
+            nu[k] += fac->z[k][v] * dir->lambda[v];
+        }
+    }
+    memset(dy, 0, sizeof dy);
+    for (i = 0; i < N; ++i) {
+        for (k = 0; k < K; ++k) {
+            rho[i] -= data->S[k][i] * nu[k];
+        }
+        dir->F[i] = rho[i] * fac->invd[i];
+        dir->zl[i] = (target->zl[i] - it->zl[i] * dir->F[i]) / it->down[i] - it->zl[i];
+        dir->zu[i] = (target->zu[i] + it->zu[i] * dir->F[i]) / it->up[i] - it->zu[i];
+        for (k = 0; k < K; ++k) {
+            dy[k] += data->St[i][k] * dir->F[i]; /* S dF: closer to the truth than L eps */
+        }
+    }
+    for (v = 0; v < V; ++v) {
+        dir->rise[v] = dir->t;
+        dir->bend[v] = 0;
+    }
+    for (k = 0; k < K; ++k) {
+        for (v = 0; v < V; ++v) {
+            dir->rise[v] -= fac->z[k][v] * dy[k];
+        }
+    }
+    for (a = 0; a < R; ++a) {
+        for (v = 0; v < V; ++v) {
+            real move = dy[a];
+            for (j = 0; j < P; ++j) {
+                move += data->D[a][j][v] * dy[R + j];
+            }
+            dir->bend[v] += (real)0.5 * move * move;
+        }
+    }
+}

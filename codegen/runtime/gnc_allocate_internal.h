@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * gnc_allocate_internal.h - what the source files of the allocator share. Not for users.
+ *
+ * Inside, everything is in the half objective  phi(F) = f(F)/2  and in the residuals
+ *
+ *     y = S F = sqrt(h) [A0; E] F = (tau, p)          K = R + P numbers, whatever N is
+ *     r_v = tau + D_v p - sqrt(h) u                   error of vertex v
+ *     q_v = |r_v|^2 / 2
+ *     z_v = [r_v; D_v' r_v]                           gradient of q_v with respect to y
+ *
+ * so that  phi = sum_i (q_i F_i^2/2 + c_i F_i) + max_v q_v + const,  q = m1 + m2, c = -(m1 Fs + m2 Fp).
+ * All curvature besides the diagonal q lies in y.
+ */
+#ifndef GNC_ALLOCATE_INTERNAL_H
+#define GNC_ALLOCATE_INTERNAL_H
+
+#include <math.h> /* sqrt, nothing else */
+#include <string.h>
+
+#include "gnc_allocate.h"
+
+enum {
+    N = GNC_ALLOC_N,                        /* actuators */
+    R = GNC_ALLOC_R,                        /* rows of the effort */
+    P = GNC_ALLOC_P,                        /* rows of the uncertain part */
+    P1 = GNC_ALLOC_AT_LEAST_1(GNC_ALLOC_P), /* the same as an array size */
+    V = GNC_ALLOC_V,                        /* vertices */
+    K = GNC_ALLOC_K,                        /* rows of S */
+    KT = GNC_ALLOC_TRIANGLE(GNC_ALLOC_K),   /* entries of a lower triangle, packed by rows */
+    A = K + 2                               /* more active vertices are always dependent */
+};
+
+#define NAME(word) GNC_ALLOC_NAME(word)
+typedef NAME(real) real;
+typedef NAME(problem) problem_t;
+typedef NAME(data) data_t;
+typedef NAME(workspace) workspace_t;
+typedef NAME(result) result_t;
+
+#ifdef GNC_ALLOC_REAL_FLOAT
+#define SQUARE_ROOT(a) sqrtf(a)
+#define EPS 1.1920929e-7F /* distance from 1 to the next number */
+#define TINY 1e-30F
+#define DEFAULT_TOLERANCE 1e-3F
+#define ROUNDING_FLOOR 2e-6F
+#define CURVATURE_FLOOR 1e-6F
+#else
+#define SQUARE_ROOT(a) sqrt(a)
+#define EPS 2.220446049250313e-16
+#define TINY 1e-200
+#define DEFAULT_TOLERANCE 1e-8
+#define ROUNDING_FLOOR 5e-15  /* gap, of the size of phi over the box, that rounding explains */
+#define CURVATURE_FLOOR 1e-10 /* least curvature of a Newton step, of that of the torque error */
+#endif
+
+/* min, max and size as comparisons: fmin and fmax differ between compilers on signed zeros. */
+static inline real smaller(real a, real b) { return a < b ? a : b; }
+static inline real larger(real a, real b) { return a > b ? a : b; }
+static inline real size_of(real a) { return a < 0 ? -a : a; }
+static inline int is_finite(real a) { return a - a == 0; }
+
+/* One checked command: what the solvers work on. */
+typedef struct {
+    real b[R];     /* sqrt(h) u */
+    real c[N];     /* linear weight */
+    real previous[N];
+    real lower[N], upper[N];
+    int8_t dead[N]; /* 1: no room to move */
+    real floor;     /* gap that counts as zero, once somebody asked */
+} command_t;
+
+/* Everything about one point F with vertex weights lambda. */
+typedef struct {
+    real y[K];
+    real r[R][V];
+    real q[V];
+    real worst; /* max_v q_v */
+    real g[N];  /* gradient of the lambda-weighted function */
+    real phi;   /* half objective */
+    real gap;   /* phi - min phi <= gap */
+} point_t;
+
+/* The active vertices, the heaviest first, and their part of a Newton system. */
+typedef struct {
+    int count, list[A];
+    real z[A][K];           /* gradients of q_v with respect to y */
+    real J[A][K];           /* T z; from the second row on, less the first row */
+    real G[A][A], inv_G[A]; /* unit factor and inverse pivots of the products of rows 1.. of J */
+} vertices_t;
+
+/* Where a full Newton step leads. */
+typedef struct {
+    real force[N], bound[N], lambda[V], slack[V];
+} goal_t;
+
+/* The interior point: its unknowns, the factors at one iterate, a direction, and what to aim at. */
+typedef struct {
+    real down[N], up[N];   /* room: F - lo, hi - F */
+    real zl[N], zu[N];     /* multipliers of the box */
+    real lambda[V], s[V];  /* vertex weights, and slack t - q_v */
+    real t;
+    real mu;               /* mean of all products multiplier * room */
+} iterate_t;
+
+/* Triangular factors keep the inverse of their diagonal; for the letters see interior_step.c. */
+typedef struct {
+    real invd[N]; /* 0 for dead actuators: they do not move */
+    real W[K][K], L[K][K], C[K][K], inv_L[K], inv_C[K];
+    real z[K][V], J[K][V];
+    real U[V][V], inv_U[V];   /* U'U = B, upper triangle */
+    real B1[V], sum_B1;       /* B^-1 (1,...,1)' and its sum */
+} factors_t;
+
+typedef struct {
+    real F[N], zl[N], zu[N], lambda[V], t;
+    real rise[V], bend[V]; /* s(a) = s + a rise - a^2 bend along the step */
+} direction_t;
+
+/* What the products zl*(F-lo), zu*(hi-F), lambda*s should become, and the second-order loss of s. */
+typedef struct {
+    real zl[N], zu[N], lambda[V], bend[V];
+} target_t;
+
+static inline int is_optimal(const data_t *data, const point_t *point)
+{
+    return point->gap <= data->tolerance * point->phi;
+}
+
+/* gnc_allocate_point.c */
+void NAME(residuals)(const data_t *data, const command_t *command, const real *force, point_t *point);
+void NAME(evaluate)(const data_t *data, const command_t *command, const real *force,
+                    const real *lambda, point_t *point);
+real NAME(floor_of)(const data_t *data, const command_t *command);
+void NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K]);
+
+/* gnc_allocate_direction.c */
+void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always);
+int NAME(factor_vertices)(vertices_t *vert, workspace_t *work, const data_t *data, const point_t *point);
+void NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
+                       const command_t *command, const point_t *point);
+
+/* gnc_allocate_interior_step.c */
+void NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
+                            const iterate_t *it, const point_t *point);
+void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const target_t *target,
+                              const data_t *data, const iterate_t *it, const point_t *point);
+
+/* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: return 1 if the answer in the workspace
+ * is certified; the point belongs to that answer. */
+int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t *command,
+                         point_t *point, int32_t *iterations);
+int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
+                     int32_t *iterations);
+
+/* ---- small dense algebra: lower triangles, inverse diagonals ---------------------------------- */
+
+/* A = L L' in place. A pivot lost in rounding becomes a zero column: S may have dependent rows
+ * (wheels), and few actuators may be free. */
+static inline void factor(real *matrix, real *inverse, int size, real lost)
+{
+    int i, j, k;
+    for (j = 0; j < size; ++j) {
+        real *row = matrix + j * size;
+        real pivot = row[j];
+        const real smallest = lost * pivot;
+        for (k = 0; k < j; ++k) {
+            pivot -= row[k] * row[k];
+        }
+        /* sqrt(p) and 1/p do not wait for each other, as 1/sqrt(p) would */
+        row[j] = pivot > smallest ? SQUARE_ROOT(pivot) : 0;
+        inverse[j] = pivot > smallest ? row[j] * (1 / pivot) : 0;
+        for (i = j + 1; i < size; ++i) {
+            real entry = matrix[i * size + j];
+            for (k = 0; k < j; ++k) {
+                entry -= matrix[i * size + k] * row[k];
+            }
+            matrix[i * size + j] = entry * inverse[j];
+            row[i] = 0;
+        }
+    }
+}
+
+/* x <- L^-1 x */
+static inline void forward(const real *L, const real *inverse, int size, real *x)
+{
+    int i, k;
+    for (i = 0; i < size; ++i) {
+        for (k = 0; k < i; ++k) {
+            x[i] -= L[i * size + k] * x[k];
+        }
+        x[i] *= inverse[i];
+    }
+}
+
+/* x <- L^-T x */
+static inline void backward(const real *L, const real *inverse, int size, real *x)
+{
+    int i, k;
+    for (i = size - 1; i >= 0; --i) {
+        x[i] *= inverse[i];
+        for (k = 0; k < i; ++k) {
+            x[k] -= L[i * size + k] * x[i];
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: MIT-0
+ *
+ * gnc_allocate_point.c - everything about one point: residuals, objective, gradient, certificate; and
+ * the matrix of Newton's method that both solvers share.
+ *
+ * The certificate is computed from F, lambda and the problem data alone: it does not trust a solver.
+ */
+#include "gnc_allocate_internal.h"
+
+void NAME(residuals)(const data_t *data, const command_t *command, const real *force, point_t *point)
+{
+    int i, k, a, j, v;
+    real y[K] = {0};
+    for (i = 0; i < N; ++i) {
+        for (k = 0; k < K; ++k) {
+            y[k] += data->St[i][k] * force[i];
+        }
+    }
+    memcpy(point->y, y, sizeof y);
+    for (v = 0; v < V; ++v) {
+        point->q[v] = 0;
+    }
+    for (a = 0; a < R; ++a) {
+        for (v = 0; v < V; ++v) {
+            real r = y[a] - command->b[a];
+            for (j = 0; j < P; ++j) {
+                r += data->D[a][j][v] * y[R + j];
+            }
+            point->r[a][v] = r;
+            point->q[v] += (real)0.5 * r * r;
+        }
+    }
+    point->worst = point->q[0];
+    for (v = 1; v < V; ++v) {
+        point->worst = larger(point->worst, point->q[v]);
+    }
+}
+
+/* g = q F + c + S' sum_v lambda_v z_v */
+static void gradient(const data_t *data, const command_t *command, const real *force,
+                     const real *lambda, point_t *point)
+{
+    int i, k, a, j, v;
+    real zbar[K] = {0};
+    for (v = 0; v < V; ++v) {
+        if (lambda[v] > 0) {
+            for (a = 0; a < R; ++a) {
+                const real r = lambda[v] * point->r[a][v];
+                zbar[a] += r;
+                for (j = 0; j < P; ++j) {
+                    zbar[R + j] += data->Dv[v][a][j] * r;
+                }
+            }
+        }
+    }
+    for (i = 0; i < N; ++i) {
+        real g = data->q[i] * force[i] + command->c[i];
+        for (k = 0; k < K; ++k) {
+            g += data->S[k][i] * zbar[k];
+        }
+        point->g[i] = g;
+    }
+}
+
+/* For any F in the box and any lambda on the simplex, the lambda-weighted function lies below phi, is
+ * short of it at F by sum lambda (max q - q_v), has gradient g there and curvature at least diag(q).
+ * Minimising that quadratic over the box, actuator by actuator, bounds min phi from below. */
+static void certify(const data_t *data, const command_t *command, const real *force,
+                    const real *lambda, point_t *point)
+{
+    int i, v;
+    real gap = 0, weights = 0;
+    for (v = 0; v < V; ++v) {
+        gap += lambda[v] * (point->worst - point->q[v]);
+    }
+    for (i = 0; i < N; ++i) {
+        const real down = command->lower[i] - force[i], up = command->upper[i] - force[i];
+        const real g = point->g[i], q = data->q[i];
+        const real newton = q > 0 ? -g * data->inv_q[i] : g > 0 ? down : up;
+        const real d = larger(down, smaller(up, newton));
+        const real effort = force[i] - data->preferred[i], change = force[i] - command->previous[i];
+        gap += larger(0, -(g + (real)0.5 * q * d) * d);
+        weights += data->m1[i] * effort * effort + data->m2[i] * change * change;
+    }
+    point->gap = gap;
+    point->phi = (real)0.5 * weights + point->worst;
+}
+
+void NAME(evaluate)(const data_t *data, const command_t *command, const real *force,
+                    const real *lambda, point_t *point)
+{
+    NAME(residuals)(data, command, force, point);
+    gradient(data, command, force, lambda, point);
+    certify(data, command, force, lambda, point);
+}
+
+/* The gap that rounding explains: some EPS of the size of phi over the box. */
+real NAME(floor_of)(const data_t *data, const command_t *command)
+{
+    int i, a;
+    real box = 0, weights = 0;
+    point_t corner;
+    for (i = 0; i < N; ++i) {
+        const real width = command->upper[i] - command->lower[i];
+        const real effort = size_of(command->lower[i] - data->preferred[i]) + width;
+        const real change = size_of(command->lower[i] - command->previous[i]) + width;
+        weights += data->m1[i] * effort * effort + data->m2[i] * change * change;
+        for (a = 0; a < R; ++a) {
+            box += data->S[a][i] * width * data->S[a][i] * width;
+        }
+    }
+    NAME(residuals)(data, command, command->lower, &corner);
+    return (real)ROUNDING_FLOOR * (weights + larger(2 * corner.worst, box));
+}
+
+/* W = sum lambda_v [I D_v]'[I D_v], the curvature of the lambda-weighted function in y, and the lower
+ * triangle of I + L' W L. With L L' = S diag(1/d) S' the latter carries the whole Newton system, and
+ * its eigenvalues are 1 or more: safe to factor whatever the data. */
+void NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K])
+{
+    int i, k, l, v, e;
+    real WL[K][K], sum = 0;
+    memset(W, 0, K * sizeof *W);
+    for (v = 0; v < V; ++v) {
+        if (lambda[v] > 0) {
+            sum += lambda[v];
+            for (k = 0, e = 0; k < P; ++k) {
+                for (l = 0; l < R; ++l) {
+                    W[R + k][l] += lambda[v] * data->Dv[v][l][k];
+                }
+                for (l = 0; l <= k; ++l, ++e) {
+                    W[R + k][R + l] += lambda[v] * data->DD[v][e];
+                }
+            }
+        }
+    }
+    for (k = 0; k < K; ++k) {
+        if (k < R) {
+            W[k][k] = sum;
+        }
+        for (l = 0; l < k; ++l) {
+            W[l][k] = W[k][l];
+        }
+    }
+    for (k = 0; k < K; ++k) {
+        real row[K] = {0};
+        for (i = 0; i < K; ++i) {
+            for (l = 0; l <= i; ++l) {
+                row[l] += W[k][i] * L[i][l];
+            }
+        }
+        memcpy(WL[k], row, sizeof row);
+    }
+    for (k = 0; k < K; ++k) {
+        real row[K] = {0};
+        row[k] = 1;
+        for (i = k; i < K; ++i) {
+            for (l = 0; l < K; ++l) {
+                row[l] += L[i][k] * WL[i][l];
+            }
+        }
+        memcpy(C[k], row, sizeof row);
+    }
+}

@@ -1,0 +1,400 @@
+"""What every back end must keep, whoever wrote it. A new one is tested by being registered.
+
+Truth is the certificate, which needs no solver, and that no two back ends contradict each other's.
+"""
+
+import importlib.util
+import os
+import subprocess
+import sys
+from functools import cache, partial
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from casadi_gnc.allocation import AllocationProblem, AllocationStatus, Allocator, Answer, backends, solve
+from casadi_gnc.allocation.backends import BackEnd, Capability, Found
+from casadi_gnc.errors import AllocationError, GncError
+
+_spec = importlib.util.spec_from_file_location(
+    "allocation_cases", Path(__file__).parents[1] / "oracles" / "allocation_cases.py"
+)
+oracle = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(oracle)
+
+CASES = oracle.cases()
+NAMES = backends.names()
+#: Packages of the extra "solvers" that "dev" leaves out: skipped by name wherever they are missing.
+NOT_IN_DEV = {"piqp", "qpalm"}
+#: Without curvature of their own (M1 = M2 = 0) the gap has a part of first order in the forces: a
+#: solver's 1e-8 of the box is 1e-8 of the full effort's cost.
+DEGENERATE_FLOOR = 1e-7
+
+
+def need(name: str) -> str:
+    """Return the name of a back end that is installed; without it fail in CI and skip, by name, elsewhere."""
+    lacking = backends.missing(name)
+    if lacking:
+        if os.environ.get("CI") == "true" and not NOT_IN_DEV.intersection(lacking):
+            pytest.fail(f"CI needs {', '.join(lacking)} for the back end {name}")
+        pytest.skip(f"{', '.join(lacking)} is not installed, for the back end {name}")
+    return name
+
+
+@pytest.fixture(params=NAMES)
+def name(request):
+    return need(request.param)
+
+
+def is_exact(name: str) -> bool:
+    return Capability.EXACT in backends.module(name).CAPABILITIES
+
+
+def solves(name: str, problem: AllocationProblem) -> bool:
+    return Capability.ROBUST in backends.module(name).CAPABILITIES or not problem.is_robust
+
+
+def labels(name: str) -> list[str]:
+    """Return the cases that a back end is given: a third of them where each takes a second."""
+    able = [label for label, case in CASES.items() if solves(name, case.problem)]
+    return able[::3] if name == "sdp_scs" else able
+
+
+def some_problem(name: str) -> AllocationProblem:
+    robust = Capability.ROBUST in backends.module(name).CAPABILITIES and name != "sdp_scs"
+    return CASES["5 mm, random 0" if robust else "no error"].problem
+
+
+@cache
+def answer(name: str, label: str) -> Answer:
+    case = CASES[label]
+    return solve(case.problem, case.command, case.previous, backend=name)
+
+
+def scale(case) -> float:
+    """Cost of the largest effort about: what rounding floors are shares of."""
+    problem = case.problem
+    return problem.accuracy_weight * max(problem.full_effort, float(np.linalg.norm(case.command))) ** 2
+
+
+def is_inside(case, forces) -> bool:
+    lower, upper = case.problem.box(case.previous)
+    return forces.shape == lower.shape and bool(np.all((lower <= forces) & (forces <= upper)))
+
+
+def test_all_cases_are_feasible_and_as_accurate_as_stated(name):
+    relative, floor = backends.module(name).ACCURACY
+    bad = {}
+    for label in labels(name):
+        case, found = CASES[label], answer(name, label)
+        allowed = max(relative * found.objective, max(floor, DEGENERATE_FLOOR * case.is_degenerate) * scale(case))
+        good = is_inside(case, found.forces) and (found.duality_gap <= allowed or not is_exact(name))
+        weights = found.vertex_weights
+        good &= weights.shape == (len(case.problem.errors),) and weights.min() >= 0 and abs(weights.sum() - 1) < 1e-12
+        good &= np.allclose(
+            found.unallocated, case.command - case.problem.effectiveness @ found.forces, rtol=0, atol=1e-15
+        )
+        if not good:
+            bad[label] = f"gap {found.duality_gap:.1e} of {found.objective:.1e}, {found.status.name}"
+    assert not bad
+
+
+@pytest.mark.parametrize("label", CASES)
+def test_no_back_end_contradicts_the_certificate_of_another(label):
+    """f_a - gap_a <= f* <= f_b. The rounding of a cost is some 1e-13 of its terms."""
+    case, names = CASES[label], [n for n in NAMES if not backends.missing(n)]
+    found = {n: answer(n, label) for n in names if label in labels(n)}
+    least = min(found, key=lambda n: found[n].objective)
+    bound = max(found, key=lambda n: found[n].objective - found[n].duality_gap)
+    rounding = 1e-13 * (found[least].objective + scale(case))
+    assert found[bound].objective - found[bound].duality_gap <= found[least].objective + rounding, (bound, least)
+    assert sum(is_exact(n) for n in found) >= 4
+
+
+def test_random_problems_without_uncertainty(name, rng):
+    """Bounds on both sides, weights and preferred forces of every actuator's own, h over five decades."""
+    relative, floor = backends.module(name).ACCURACY
+    for k in range(5 if name == "sdp_scs" else 25):
+        effectiveness = rng.normal(size=(3, 4))
+        problem = AllocationProblem(
+            effectiveness,
+            -rng.uniform(0, 1, 4),
+            rng.uniform(0, 1, 4),
+            effort_weight=rng.uniform(0.1, 10, 4),
+            change_weight=rng.uniform(0, 10, 4),
+            accuracy_weight=10.0 ** rng.uniform(1, 6),
+            max_step=rng.choice([0.2, np.inf]),
+            preferred=rng.uniform(-0.1, 0.1, 4),
+        )
+        case = oracle.Case(problem, effectiveness @ rng.uniform(-1, 1, 4), rng.uniform(-0.5, 0.5, 4))
+        found = solve(problem, case.command, case.previous, backend=name)
+        assert is_inside(case, found.forces)
+        if is_exact(name):
+            assert found.duality_gap <= max(relative * found.objective, floor * scale(case)), k
+
+
+def test_unreachable_and_dead_cases_are_what_they_should_be():
+    """Closed forms: with every actuator dead nothing is done, and the cost is that of the command."""
+    case = CASES["all dead"]
+    found = answer("clarabel", "all dead")
+    assert not np.any(found.forces)
+    assert found.objective == pytest.approx(case.problem.accuracy_weight * case.command @ case.command, rel=1e-12)
+    assert answer("clarabel", "all-zero command").objective <= 1e-15 * scale(CASES["all-zero command"])
+
+
+def test_one_actuator_has_a_closed_form(name):
+    """u > F (1 - d), so the smaller effectiveness is worst: F = h (1 - d) u / (m + h (1 - d)^2)."""
+    robust = Capability.ROBUST in backends.module(name).CAPABILITIES
+    d, m, h, u = 0.3 * robust, 2.0, 3.0, 1.0
+    errors = np.array([[[-d]], [[d]]])
+    problem = AllocationProblem(
+        np.array([[1.0]]),
+        0.0,
+        2.0,
+        coupling=np.array([[1.0]]),
+        errors=errors,
+        effort_weight=m,
+        change_weight=0.0,
+        accuracy_weight=h,
+    )
+    found = solve(problem, [u], [0.5], backend=name)
+    if is_exact(name):
+        assert found.forces[0] == pytest.approx(h * (1 - d) * u / (m + h * (1 - d) ** 2), abs=2e-3)
+        if robust:
+            assert found.vertex_weights[0] == pytest.approx(1.0, abs=2e-2)
+            assert found.worst_vertex == 0
+
+
+def test_samples_in_a_row_are_as_accurate_as_one(name):
+    """A slew: whatever is kept from the last sample must not spoil the next."""
+    problem = some_problem(name)
+    allocator = Allocator(problem, name)
+    relative, floor = backends.module(name).ACCURACY
+    for k in range(25):
+        command = oracle.COMMAND * np.cos([0.2 * k, 0.3 * k + 1, 0.1 * k])
+        case = oracle.Case(problem, command, allocator.previous)
+        found = allocator.solve(command)
+        assert is_inside(case, found.forces)
+        if is_exact(name):
+            assert found.duality_gap <= max(relative * found.objective, floor * scale(case)), k
+
+
+def test_two_allocators_do_not_disturb_each_other(name):
+    """Nearly: ProxQP's sums depend on where its memory is aligned."""
+    problem = some_problem(name)
+    commands = [oracle.COMMAND, -oracle.COMMAND]
+    alone = [Allocator(problem, name).solve(command).forces for command in commands]
+    both = [Allocator(problem, name) for _ in commands]
+    again = [allocator.solve(command).forces for allocator, command in zip(both, commands, strict=True)]
+    assert np.allclose(alone, again, rtol=0, atol=1e-9 * oracle.MAX_FORCE)
+
+
+def test_unknown_and_senseless_options_are_refused(name):
+    problem = some_problem(name)
+    with pytest.raises(AllocationError, match="nonsense"):
+        Allocator(problem, name, nonsense=1)
+    if is_exact(name):
+        for wrong in (-1.0, float("nan"), "tight"):
+            with pytest.raises(AllocationError, match="tolerance|tight|refused|number"):
+                Allocator(problem, name, tolerance=wrong)
+
+
+def test_a_command_that_is_no_number_keeps_the_forces(name):
+    allocator = Allocator(some_problem(name), name)
+    before = allocator.solve(oracle.COMMAND).forces
+    for wrong in (np.nan, np.inf, -np.inf, 1e200):
+        found = allocator.solve([wrong, 0.0, 0.0])
+        assert found.status is AllocationStatus.BAD_COMMAND
+        assert np.array_equal(found.forces, before)
+        found = allocator.solve(oracle.COMMAND, np.append(np.full(11, 1e-3), wrong))
+        assert found.status is AllocationStatus.BAD_COMMAND
+        assert np.all(np.isfinite(found.forces))
+        before = allocator.previous
+    assert allocator.solve(oracle.COMMAND).status is not AllocationStatus.BAD_COMMAND
+
+
+def test_wrong_shapes_are_refused(name):
+    allocator = Allocator(some_problem(name), name)
+    with pytest.raises(AllocationError, match=r"command has shape \(2,\), expected \(3,\)"):
+        allocator.solve([1.0, 2.0])
+    with pytest.raises(AllocationError, match=r"previous \(3,\), expected \(12,\)"):
+        allocator.solve(oracle.COMMAND, [1.0, 2.0, 3.0])
+
+
+def test_uncertainty_is_refused_by_a_back_end_for_quadratic_programs(name):
+    robust, certain = CASES["5 mm, random 0"].problem, CASES["no error"].problem
+    if Capability.ROBUST in backends.module(name).CAPABILITIES:
+        pytest.skip("it takes uncertainty")
+    with pytest.raises(AllocationError, match=f"'{name}' solves problems without uncertainty only; leave coupling"):
+        Allocator(robust, name)
+    allocator = Allocator(certain, name)
+    with pytest.raises(AllocationError, match="without uncertainty only"):
+        allocator.update(errors=robust.errors)
+    assert allocator.solve(oracle.COMMAND).status.is_certified  # and what was there still works
+
+
+def test_update_changes_the_problem(name):
+    allocator = Allocator(some_problem(name), name)
+    allocator.solve(oracle.COMMAND)
+    allocator.update(upper=1e-3)
+    assert allocator.solve(oracle.COMMAND).forces.max() <= 1e-3
+    with pytest.raises(AllocationError, match="nonsense"):
+        allocator.update(nonsense=1.0)
+
+
+def test_unknown_names_are_answered_with_the_known_ones():
+    with pytest.raises(AllocationError, match="no allocation back end 'none'; there is .*clarabel"):
+        Allocator(CASES["no error"].problem, "none")
+    with pytest.raises(AllocationError, match="qpsolvers does not find the solver 'none'"):
+        Allocator(CASES["no error"].problem, "qpsolvers:none")
+
+
+@pytest.mark.parametrize("solver", ["clarabel", "daqp", "proxqp", "scs"])
+def test_every_solver_of_qpsolvers_can_be_named(solver):
+    need(solver)
+    case = CASES["no error"]
+    found = solve(case.problem, case.command, case.previous, backend=f"qpsolvers:{solver}")
+    assert found.status.is_certified
+    with pytest.raises(AllocationError, match="refuses|max_iterations|takes no"):
+        Allocator(case.problem, f"qpsolvers:{solver}", max_iterations=0)
+
+
+def test_solvers_under_the_gpl_are_never_chosen():
+    assert not {"quadprog", "cvxopt", "kvxopt", "ecos", "qpswift"}.intersection(NAMES)
+
+
+# Back ends that lie, and that fail.
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    """Register a back end "fake" that finds what a function of the sample says."""
+
+    def register(find, capabilities=Capability.ROBUST | Capability.EXACT):
+        home = BackEnd(capabilities, (), (1e-6, 1e-10), lambda problem: SimpleNamespace(find=find))
+        monkeypatch.setitem(sys.modules, "casadi_gnc.allocation.backends.fake_", SimpleNamespace(FAKE=home))
+        monkeypatch.setitem(backends._HOMES, "fake", "fake_:FAKE")
+
+    return register
+
+
+N, V = 12, 8
+UNUSABLE = {
+    "nan": np.full(N, np.nan),
+    "one nan": np.append(np.zeros(N - 1), np.nan),
+    "infinite": np.full(N, np.inf),
+    "too short": np.zeros(N - 1),
+    "one number": np.array(1e-3),
+    "one number in a list": np.array([1e-3]),
+    "a matrix": np.zeros((N, 1)),
+}
+
+
+@pytest.mark.parametrize("forces", UNUSABLE.values(), ids=UNUSABLE)
+def test_unusable_forces_are_a_failure_and_the_last_ones_stay(fake, forces):
+    fake(lambda *sample: Found(forces, np.full(V, 1 / V), claimed=True))
+    case = CASES["5 mm, random 0"]
+    found = solve(case.problem, case.command, case.previous, backend="fake")
+    assert found.status is AllocationStatus.FAILED
+    assert found.claimed
+    assert np.array_equal(found.forces, case.previous)
+
+
+WRONG = {
+    "zero": np.zeros(N),
+    "full": np.full(N, oracle.MAX_FORCE),
+    "far outside": np.full(N, 1e6),
+    "beyond squares": np.full(N, -1e300),
+    "half": np.full(N, oracle.MAX_FORCE / 2),
+}
+WEIGHTS = {
+    "equal": np.full(V, 1 / V),
+    "none": None,
+    "nan": np.full(V, np.nan),
+    "negative": -np.ones(V),
+    "zero": np.zeros(V),
+    "too many": np.ones(V + 1),
+    "huge": np.full(V, 1e300),
+}
+
+
+@pytest.mark.parametrize("forces", WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
+def test_a_liar_is_not_certified(fake, forces, weights):
+    fake(lambda *sample: Found(forces, weights, claimed=True))
+    case = CASES["5 mm, random 0"]
+    found = solve(case.problem, case.command, case.previous, backend="fake")
+    assert found.status is AllocationStatus.NOT_CERTIFIED
+    assert is_inside(case, found.forces)
+    best = answer("clarabel", "5 mm, random 0")
+    assert found.objective - found.duality_gap <= best.objective  # even a liar's bound holds
+    assert abs(found.vertex_weights.sum() - 1) < 1e-12
+
+
+@pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
+def test_good_forces_are_certified_whatever_the_multipliers(fake, weights):
+    best = answer("ipopt", "5 mm, random 0").forces
+    fake(lambda *sample: Found(best, weights, claimed=False))
+    case = CASES["5 mm, random 0"]
+    found = solve(case.problem, case.command, case.previous, backend="fake")
+    assert found.status is AllocationStatus.OPTIMAL
+    assert not found.claimed
+
+
+@pytest.mark.parametrize("error", [RuntimeError("it broke"), TypeError("it broke"), ZeroDivisionError("it broke")])
+def test_a_back_end_that_raises_is_heard(fake, error):
+    def find(*sample):
+        raise error
+
+    fake(find)
+    with pytest.raises((type(error), GncError), match="it broke"):
+        solve(CASES["no error"].problem, oracle.COMMAND, backend="fake")
+
+
+# What is imported, and what is printed.
+
+
+def run(code: str) -> subprocess.CompletedProcess:
+    folder = {"PYTHONPATH": str(Path(oracle.__file__).parent)}
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, **folder}
+    )
+
+
+def test_solvers_are_imported_when_first_used():
+    heavy = ["clarabel", "cvxpy", "daqp", "highspy", "osqp", "piqp", "proxsuite", "qpsolvers", "scipy", "scs"]
+    code = "import sys, casadi_gnc.allocation as a; a.backends.names(); print([m for m in %r if m in sys.modules])"
+    assert run(code % heavy).stdout.strip() == "[]"
+    code = "import sys; from casadi_gnc.allocation import backends as b; b.available(); "
+    code += "print([m for m in %r if m in sys.modules])"
+    assert run(code % [m for m in heavy if m != "scipy"]).stdout.strip() == "[]"
+
+
+def test_all_are_quiet():
+    """Banners and complaints of C libraries go around sys.stdout, so look at the process."""
+    code = """
+import warnings; warnings.simplefilter("error")
+import allocation_cases as oracle
+from casadi_gnc.allocation import Allocator, backends
+for name in backends.available():
+    robust = backends.Capability.ROBUST in backends.module(name).CAPABILITIES
+    problems = [oracle.huang2020(0.0, effort_weight=0.0, change_weight=0.0)]
+    problems += [oracle.huang2020(), oracle.huang2020(max_step=2e-4)] if robust and name != "sdp_scs" else []
+    for problem in problems:
+        Allocator(problem, name).solve(oracle.COMMAND, [1e-3] * 12)
+"""
+    done = run(code)
+    assert (done.stdout, done.stderr) == ("", "")
+
+
+def test_registry_says_what_there_is(name):
+    home = backends.module(name)
+    assert isinstance(home.CAPABILITIES, Capability)
+    assert callable(home.set_up)
+    assert all(value > 0 for value in home.ACCURACY)
+    kinds = Capability.SOCP | Capability.SDP | Capability.NLP | Capability.QP | Capability.C_CODE
+    assert home.CAPABILITIES & kinds
+    assert bool(home.CAPABILITIES & Capability.QP) <= (Capability.ROBUST not in home.CAPABILITIES)
+    assert isinstance(partial(home.set_up, some_problem(name))(), object)
