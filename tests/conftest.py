@@ -2,12 +2,17 @@
 
 import os
 import shutil
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import casadi_gnc
 from casadi_gnc.compilers import Compiler, _probe
+
+# Independent implementations that tests and benchmarks compare with.
+sys.path.insert(0, str(Path(__file__).parent / "oracles"))
 
 
 @pytest.fixture

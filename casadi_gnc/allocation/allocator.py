@@ -67,13 +67,15 @@ class Allocator:
             raise AllocationError(f"no such field of the problem: {error}") from error
         self._set_up(changed)
 
-    def solve(self, command: Any, previous: Any = None) -> Answer:
+    def solve(self, command: Any, previous: Any = None, box: tuple[np.ndarray, np.ndarray] | None = None) -> Answer:
         """Return the allocation of a command.
 
         Parameters
         ----------
         command : u, (R,), [N m].
         previous : Fp, (N,), [N]; those of the last call by default, at first zero.
+        box : lower and upper bounds of this sample, (N,) each, [N]; the problem's amplitude and rate
+            bounds by default.
 
         Raises
         ------
@@ -98,19 +100,25 @@ class Allocator:
                 Found(kept, claimed=False),
                 AllocationStatus.BAD_COMMAND,
                 started,
+                problem.box(kept) if box is None else box,
             )
-        lower, upper = problem.box(last)
-        return self._answer(u, last, self._solver.find(u, last, lower, upper), None, started)
+        lower, upper = problem.box(last) if box is None else box
+        return self._answer(u, last, self._solver.find(u, last, lower, upper), None, started, (lower, upper))
 
     def _answer(
-        self, u: np.ndarray, last: np.ndarray, found: Found, status: AllocationStatus | None, started: float
+        self,
+        u: np.ndarray,
+        last: np.ndarray,
+        found: Found,
+        status: AllocationStatus | None,
+        started: float,
+        box: tuple[np.ndarray, np.ndarray],
     ) -> Answer:
-        problem = self.problem
-        lower, upper = problem.box(last)
+        problem, (lower, upper) = self.problem, box
         usable = np.shape(found.forces) == np.shape(lower) and bool(np.all(np.isfinite(found.forces)))
         forces = np.clip(found.forces if usable else last, lower, upper)
         seconds = time.perf_counter() - started
-        cost, gap, weights, certified = certify(problem, u, last, forces, found.weights, self._accuracy)
+        cost, gap, weights, certified = certify(problem, u, last, forces, found.weights, self._accuracy, box)
         if status is None:
             status = certified if usable else AllocationStatus.FAILED
         self.previous = forces.copy()
@@ -121,7 +129,7 @@ class Allocator:
             vertex_weights=weights,
             worst_vertex=int(np.argmax(problem.vertex_costs(forces, u))),
             unallocated=u - problem.effectiveness @ forces,
-            saturation=saturation(problem, forces, last),
+            saturation=saturation(problem, forces, box),
             status=status,
             iterations=found.iterations,
             claimed=found.claimed,

@@ -86,6 +86,7 @@ def certify(
     forces: np.ndarray,
     weights: np.ndarray | None,
     accuracy: tuple[float, float],
+    box: tuple[np.ndarray, np.ndarray],
 ) -> tuple[float, float, np.ndarray, AllocationStatus]:
     """Return cost, gap, vertex weights and status of feasible forces.
 
@@ -94,9 +95,9 @@ def certify(
     weights : (V,), the solver's multipliers; where it gives none, or poor ones, weights are sought
         that make the gap small.
     accuracy : relative tolerance and rounding floor, see `ACCURACIES`.
+    box : lower and upper bounds of this sample, (N,) each.
     """
-    lower, upper = problem.box(previous)
-    sample = (command, previous, lower, upper)
+    sample = (command, previous, *box)
     cost = problem.objective(forces, command, previous)
     floor = accuracy[1] * problem.accuracy_weight * max(problem.full_effort, float(np.linalg.norm(command))) ** 2
     enough = max(accuracy[0] * cost, floor)
@@ -166,9 +167,9 @@ def best_weights(
     return weights / weights.sum() if weights.sum() > 0 else equal
 
 
-def saturation(problem: AllocationProblem, forces: np.ndarray, previous: np.ndarray) -> np.ndarray:
-    """Return the `Saturation` code of every actuator, (N,)."""
-    lower, upper = problem.box(previous)
+def saturation(problem: AllocationProblem, forces: np.ndarray, box: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return the `Saturation` code of every actuator, (N,), at the bounds of this sample."""
+    lower, upper = box
     near = 1e-9 * np.maximum(upper - lower, 0.0)
     codes = np.zeros(len(forces), dtype=int)
     at_lower, at_upper = forces <= lower + near, forces >= upper - near

@@ -63,14 +63,14 @@ class SolverInFlight:
         allocator = Allocator(self.problem, self.backend)
 
         def allocate(command: Any, previous: Any, lower: Any, upper: Any) -> tuple[np.ndarray, int, np.ndarray]:
-            answer = allocator.solve(command, previous)
+            answer = allocator.solve(command, previous, (np.array(lower), np.array(upper)))
             status = StepStatus(0)
             if answer.status is AllocationStatus.NOT_CERTIFIED:
                 status = StepStatus.ALLOCATION_INEXACT
             elif not answer.status.is_certified:
                 status = StepStatus.ALLOCATION_FAILED
             report = [answer.duality_gap, answer.objective, float(answer.worst_vertex), float(answer.iterations)]
-            return np.clip(answer.forces, lower, upper), int(status), np.array(report)
+            return answer.forces, int(status), np.array(report)
 
         return allocate
 

@@ -110,7 +110,9 @@ def with_minimum_impulse(
     forces = np.where(answer.forces < least / 2, np.maximum(0.0, problem.lower), answer.forces)
     u = np.asarray(command, dtype=float)
     cost = problem.objective(forces, u, last)
-    _, _, _, status = certify(problem, u, last, relaxed.forces, relaxed.vertex_weights, ACCURACIES["mid"])
+    _, _, _, status = certify(
+        problem, u, last, relaxed.forces, relaxed.vertex_weights, ACCURACIES["mid"], problem.box(last)
+    )
     bound = relaxed.objective - relaxed.duality_gap
     return replace(
         answer,

@@ -15,6 +15,8 @@ from casadi_gnc import assets, compilers
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
 
+#: Flags with which gcc vectorises it; the words stay the same.
+FAST = ("-O3", "-fno-math-errno", "-fno-trapping-math")
 #: Largest sizes it is written for: actuators, rows of effort, rows of coupling, vertices.
 LARGEST = (32, 6, 8, 64)
 
@@ -69,7 +71,6 @@ class OnlineSolver:
     problem : what stays the same.
     tolerance : relative duality gap at which an iteration ends; 0 means 1e-8.
     interior_point_only : use the base method alone.
-    optimise : optimisation level of the build.
 
     Raises
     ------
@@ -83,7 +84,6 @@ class OnlineSolver:
         *,
         tolerance: float = 0.0,
         interior_point_only: bool = False,
-        optimise: str = "-O2",
         compiler: compilers.Compiler | None = None,
     ) -> None:
         self._sizes, self._method = sizes(problem), int(interior_point_only)
@@ -92,7 +92,7 @@ class OnlineSolver:
         c = compilers.load(
             source,
             include=codegen / "runtime",
-            flags=(optimise, *flags(problem)),
+            flags=(*FAST, *flags(problem)),
             units=units(),
             compiler=compiler,
         )

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from scipy.linalg import block_diag, null_space
+from scipy.linalg import null_space
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
@@ -90,9 +90,14 @@ def combine(*problems: AllocationProblem) -> AllocationProblem:
         name: np.concatenate([getattr(p, name) for p in problems])
         for name in ("lower", "upper", "effort_weight", "change_weight", "max_step", "preferred")
     }
+    coupling = np.zeros((sum(len(p.coupling) for p in problems), sum(p.count for p in problems)))
+    row = column = 0
+    for p in problems:
+        coupling[row : row + len(p.coupling), column : column + p.count] = p.coupling
+        row, column = row + len(p.coupling), column + p.count
     return AllocationProblem(
         effectiveness=np.hstack([p.effectiveness for p in problems]),
-        coupling=np.reshape(block_diag(*(p.coupling for p in problems)), (-1, sum(p.count for p in problems))),
+        coupling=coupling,
         errors=np.array([np.hstack(corners) for corners in product(*(p.errors for p in problems))]),
         accuracy_weight=first.accuracy_weight,
         **joined,

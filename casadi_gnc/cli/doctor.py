@@ -15,7 +15,6 @@ _EXTRAS = (
     ("piqp", "piqp", "solvers", "a QP solver for the non-robust allocation"),
     ("osqp", "osqp", "solvers", "a QP solver for the non-robust allocation"),
     ("highspy", "highspy", "solvers", "a QP solver for the non-robust allocation"),
-    ("quadprog", "quadprog", "solvers", "a QP solver for the non-robust allocation"),
     ("ziglang", "ziglang", "zig", "a C compiler from a wheel, for machines without one"),
 )
 

@@ -113,7 +113,7 @@ class CompiledEngine:
         allocator, self._online, self._solve = scheme.actuation.allocator, None, None
         if isinstance(allocator, OnlineInFlight):
             self._online = allocator.solver(self.compiler)
-            flags, units = (*flags, *online.flags(allocator.problem)), online.units()
+            flags, units = (*online.FAST, *flags[1:], *online.flags(allocator.problem)), online.units()
         elif not tapes.symbolic:
             self._solve = allocator.start()
         library = compilers.load(self.source, include=include, flags=flags, units=units, compiler=self.compiler)

@@ -87,8 +87,7 @@ int32_t NAME(setup)(data_t *data, const problem_t *problem)
         }
         weight_sum += problem->m1[i] + problem->m2[i];
     }
-    /* Without any weight the forces are not unique; 1e-9 of the torque term's curvature makes them
-     * so, and the fast path possible, at a relative price of 1e-9. */
+    /* Without any weight the forces are not unique; 1e-9 of the torque term's curvature makes them so. */
     data->regularised = weight_sum <= 0 && !problem->keep_zero_weights;
     for (i = 0; i < N; ++i) {
         data->m1[i] = data->regularised ? (real)1e-9 * size_A0 : problem->m1[i];
@@ -139,7 +138,8 @@ static int read_command(command_t *command, const data_t *data, const real *torq
     }
     for (i = 0; i < N; ++i) {
         real low = lower[i], high = upper[i];
-        sound = sound && is_finite(low) && is_finite(high) && low <= high && is_finite(previous[i]);
+        sound = sound && is_finite(low) && is_finite(high) && low <= high;
+        sound = sound && is_finite(previous[i]);
         if (max_step) {
             sound = sound && max_step[i] >= 0;
             low = smaller(larger(lower[i], previous[i] - max_step[i]), upper[i]);
@@ -177,7 +177,9 @@ static void report(const data_t *data, const command_t *command, const real *low
     result->worst_vertex = 0;
     for (v = 0; v < V; ++v) {
         result->lambda[v] = work->lambda[v];
-        result->worst_vertex = point->q[v] > point->q[result->worst_vertex] ? v : result->worst_vertex;
+        if (point->q[v] > point->q[result->worst_vertex]) {
+            result->worst_vertex = v;
+        }
     }
     for (a = 0; a < R; ++a) {
         result->unallocated[a] = (command->b[a] - point->y[a]) * data->inv_sqrt_h;
@@ -189,8 +191,8 @@ static void report(const data_t *data, const command_t *command, const real *low
 }
 
 /* A command that cannot be used: hold the last forces, as far as the box allows. */
-static int32_t hold(workspace_t *work, const data_t *data, const real *previous, const real *lower, const real *upper,
-                    result_t *result)
+static int32_t hold(workspace_t *work, const data_t *data, const real *previous, const real *lower,
+                    const real *upper, result_t *result)
 {
     int i;
     memset(result, 0, sizeof *result);
@@ -224,12 +226,14 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
     fast = fast && (!data->regularised || data->distinct == 1);
     if (fast) {
         result->path = GNC_ALLOC_PATH_ACTIVE_SET;
-        certified = NAME(active_set)(work, data, &command, &point, &result->active_set_iterations);
+        certified = NAME(active_set)(work, data, &command, &point,
+                                     &result->active_set_iterations);
     }
     if (!certified) {
         result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
         command.floor = NAME(floor_of)(data, &command);
-        certified = NAME(interior_point)(work, data, &command, &point, &result->interior_point_iterations);
+        certified = NAME(interior_point)(work, data, &command, &point,
+                                         &result->interior_point_iterations);
     }
     if (!certified && fast) { /* degenerate: let the active set finish what the interior began */
         int32_t more = 0;

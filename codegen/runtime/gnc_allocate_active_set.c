@@ -30,6 +30,12 @@ enum {
     NOTHING = -1     /* no obstacle; otherwise actuator i is i and vertex v is N + v */
 };
 #define OPENING (real)0.01 /* room that open_up gives, of the box, the largest gradient, the worst q_v */
+#define SMALL (real)0.01   /* of the tolerance: a multiplier or slack this wrong does not show in the gap */
+#ifdef GNC_ALLOC_REAL_FLOAT
+#define SLIP 1e-4F /* of the box: a force this far outside is clipped, not bound; its gap is the square */
+#else
+#define SLIP 1e-8
+#endif
 
 /* ---- where to start --------------------------------------------------------------------------- */
 
@@ -101,7 +107,8 @@ static void open_up(workspace_t *work, const command_t *command, const point_t *
     for (i = 0; i < N; ++i) {
         const real room = OPENING * (command->upper[i] - command->lower[i]);
         if (!work->side[i]) {
-            work->force[i] = larger(command->lower[i] + room, smaller(command->upper[i] - room, work->force[i]));
+            work->force[i] = smaller(command->upper[i] - room, work->force[i]);
+            work->force[i] = larger(command->lower[i] + room, work->force[i]);
         } else if (-work->bound[i] * (real)work->side[i] < OPENING * largest) {
             work->bound[i] = -OPENING * largest * (real)work->side[i];
         }
@@ -123,9 +130,10 @@ static int first_obstacle(real *clear, const goal_t *goal, const workspace_t *wo
                           const command_t *command, const point_t *point)
 {
     int i, v, obstacle = NOTHING;
-    const real small = (real)1e-3 * data->tolerance * point->phi; /* what the gap does not notice */
+    const real small = SMALL * data->tolerance * point->phi; /* what the gap does not notice */
     *clear = 1;
     for (i = 0; i < N + V; ++i) {
+        const real width = i < N ? command->upper[i] - command->lower[i] : 0;
         real from = 0, to = 0; /* an obstacle where this crosses zero from above */
         if (i >= N) {
             v = i - N;
@@ -135,11 +143,11 @@ static int first_obstacle(real *clear, const goal_t *goal, const workspace_t *wo
         } else if (work->side[i]) {
             from = -work->bound[i] * (real)work->side[i];
             to = -goal->bound[i] * (real)work->side[i];
-            to = to * (command->upper[i] - command->lower[i]) < -small && !command->dead[i] ? to : 0;
-        } else if (goal->force[i] < command->lower[i]) {
+            to = to * width < -small && !command->dead[i] ? to : 0;
+        } else if (goal->force[i] < command->lower[i] - SLIP * width) {
             from = work->force[i] - command->lower[i];
             to = goal->force[i] - command->lower[i];
-        } else if (goal->force[i] > command->upper[i]) {
+        } else if (goal->force[i] > command->upper[i] + SLIP * width) {
             from = command->upper[i] - work->force[i];
             to = command->upper[i] - goal->force[i];
         }
@@ -192,7 +200,8 @@ static int change_all_bounds(workspace_t *work, const goal_t *goal, const comman
     move(work, goal, command, 1, 1);
     for (i = 0; i < N; ++i) {
         if (!work->side[i]) {
-            const int above = goal->force[i] > command->upper[i], below = goal->force[i] < command->lower[i];
+            const int above = goal->force[i] > command->upper[i];
+            const int below = goal->force[i] < command->lower[i];
             work->side[i] = (int8_t)(above - below);
             changed |= above | below;
         } else if (goal->bound[i] * (real)work->side[i] > 0 && !command->dead[i]) {
@@ -238,7 +247,8 @@ static int exchange(workspace_t *work, const vertices_t *vert, const data_t *dat
         const real sign = way ? -1 : 1;
         for (k = 0; k <= last + N; ++k) {
             const int which = k < N ? k : N + vert->list[k - N];
-            const real stock = k < N ? larger(0, -work->bound[k] * (real)work->side[k]) : work->lambda[which - N];
+            const real stock = k < N ? larger(0, -work->bound[k] * (real)work->side[k])
+                                     : work->lambda[which - N];
             const real use = sign * (k < N ? rate[k] * (real)work->side[k] : -n[k - N]);
             if (use > 0 && which != newcomer && (drop[way] < 0 || stock < reach[way] * use)) {
                 reach[way] = stock / use;

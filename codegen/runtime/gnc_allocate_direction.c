@@ -26,7 +26,7 @@
 /* Bring L, W and T up to date with the free set and the vertex weights. */
 void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
 {
-    int i, k, l, v, e;
+    int i, k, l, v, e, same_set, same_weights;
     uint32_t free_set = 0;
     real C[K][K], inverse[K], drift = 0;
     for (i = 0; i < N; ++i) {
@@ -35,7 +35,12 @@ void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
     for (v = 0; v < V; ++v) {
         drift += size_of(work->lambda[v] - work->lambda_W[v]);
     }
-    if (work->stamp != data->stamp || work->free_set != free_set) {
+    same_set = work->stamp == data->stamp && work->free_set == free_set;
+    same_weights = work->stamp == data->stamp && drift <= LAMBDA_DRIFT && !always;
+    if (same_set && same_weights) {
+        return;
+    }
+    if (!same_set) {
         real packed[KT] = {0};
         for (i = 0; i < N; ++i) {
             if (!work->side[i]) {
@@ -52,11 +57,11 @@ void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
         factor(&work->L[0][0], inverse, K, 4 * EPS);
         work->stamp = data->stamp;
         work->free_set = free_set;
-    } else if (drift <= LAMBDA_DRIFT && !always) {
-        return;
     }
-    memcpy(work->lambda_W, work->lambda, sizeof work->lambda);
-    NAME(inner_matrix)(data, work->lambda, work->L, work->W, C);
+    if (!same_weights) { /* or else keep W: two sets compared on one path should see the same curvature */
+        memcpy(work->lambda_W, work->lambda, sizeof work->lambda);
+    }
+    NAME(inner_matrix)(data, work->lambda_W, work->L, work->W, C);
     factor(&C[0][0], inverse, K, 0);
     for (k = 0; k < K; ++k) {
         real row[K];

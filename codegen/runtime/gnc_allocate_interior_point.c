@@ -45,7 +45,8 @@ static void aim(target_t *target, const direction_t *dir, const command_t *comma
 {
     int i, v;
     for (i = 0; i < N; ++i) {
-        const real cross = second_order * dir->zl[i] * dir->F[i], cross_up = second_order * dir->zu[i] * dir->F[i];
+        const real cross = second_order * dir->zl[i] * dir->F[i];
+        const real cross_up = second_order * dir->zu[i] * dir->F[i];
         target->zl[i] = command->dead[i] ? 0 : mu - cross;
         target->zu[i] = command->dead[i] ? 0 : mu + cross_up;
     }

@@ -54,7 +54,9 @@ def test_strong_convexity_bounds_the_forces(rng):
     lower, upper = case.problem.box(case.previous)
     for _ in range(50):
         forces = rng.uniform(lower, upper)
-        _, gap, _, _ = certify(case.problem, case.command, case.previous, forces, None, ACCURACIES["mid"])
+        _, gap, _, _ = certify(
+            case.problem, case.command, case.previous, forces, None, ACCURACIES["mid"], case.problem.box(case.previous)
+        )
         assert ((case.problem.effort_weight + case.problem.change_weight) * (forces - best) ** 2).sum() <= gap
 
 
@@ -63,7 +65,8 @@ def test_status_follows_the_gap():
     best = solve(case.problem, case.command, case.previous, backend="ipopt")
 
     def status(forces, accuracy):
-        return certify(case.problem, case.command, case.previous, forces, None, accuracy)[3]
+        box = case.problem.box(case.previous)
+        return certify(case.problem, case.command, case.previous, forces, None, accuracy, box)[3]
 
     worse = np.clip(best.forces + 1e-6, *case.problem.box(case.previous))
     assert status(best.forces, ACCURACIES["high"]) is AllocationStatus.OPTIMAL

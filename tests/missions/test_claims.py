@@ -1,8 +1,6 @@
 """The numbers of Huang, Biggs, Duan (2020) as re-derived, and an oracle written by hand."""
 
-import importlib.util
-from pathlib import Path
-
+import detumble_numpy as oracle
 import numpy as np
 import pytest
 
@@ -11,12 +9,6 @@ from casadi_gnc.missions.building import build
 from casadi_gnc.missions.loading import read
 from casadi_gnc.missions.schema import MissionModel
 from casadi_gnc.status import StepStatus
-
-_spec = importlib.util.spec_from_file_location(
-    "detumble_numpy", Path(__file__).parents[1] / "oracles" / "detumble_numpy.py"
-)
-oracle = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(oracle)
 
 
 @pytest.mark.parametrize("feedback", ["wanted", "achieved"])

@@ -35,7 +35,9 @@ def test_linearised_loop_has_the_designed_poles(detumble):
     law, h = detumble.scheme("observer_pinv").law, 0.1
     rate, m = ca.SX.sym("rate", 3), law.memory.symbol("m")
     torque = law.command(0.0, rate, m)
-    moved = ca.vertcat(rate + h * law.body.acceleration(ca.DM.zeros(3), rate, torque), advance(law, 0.0, rate, m, torque, torque))
+    moved = ca.vertcat(
+        rate + h * law.body.acceleration(ca.DM.zeros(3), rate, torque), advance(law, 0.0, rate, m, torque, torque)
+    )
     at = ca.Function("at", [rate, m], [ca.jacobian(moved, ca.vertcat(rate, m))])
     # The known engine torque must be balanced for this to be a rest: it is, by the command.
     poles = np.sort(np.linalg.eigvals(np.array(at(np.zeros(3), np.zeros(6)))).real)
