@@ -29,6 +29,7 @@ pictures: .venv/installed
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/flight_speed.py
+	$(BIN)/python tests/bench/allocation_speed.py
 
 docs: .venv/installed-docs
 	$(BIN)/sphinx-build -W -q docs docs/_build

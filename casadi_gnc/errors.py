@@ -47,3 +47,7 @@ class OutputError(GncError):
 
 class FlightError(GncError):
     """Report a flight that cannot be flown as asked."""
+
+
+class SynthesisError(GncError):
+    """Report matrix inequalities that cannot be posed, or a gain asked for that is not certified."""

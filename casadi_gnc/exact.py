@@ -20,13 +20,6 @@ def is_number(value: Any) -> bool:
     return not isinstance(value, (ca.SX, ca.MX))
 
 
-def exp(x: Any) -> Any:
-    """Return e**x, correctly rounded for a number, symbolic for an expression."""
-    if is_number(x):
-        return float(_CONTEXT.exp(Decimal(float(x))))
-    return ca.exp(x)
-
-
 def phi1(x: Any) -> Any:
     """Return (e**x - 1)/x, continued by 1 at x = 0.
 

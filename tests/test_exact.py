@@ -12,7 +12,6 @@ mpmath.mp.dps = 60
 def test_numbers_are_correctly_rounded(rng):
     for x in [*rng.uniform(-30, 30, 200), 1e-17, -1e-9, 0.0, 2.7, np.pi / 7]:
         m = mpmath.mpf(float(x))
-        assert exact.exp(x) == float(mpmath.exp(m))
         assert exact.phi1(x) == float(mpmath.expm1(m) / m if x else 1)
         assert exact.cos_sin(x) == (float(mpmath.cos(m)), float(mpmath.sin(m)))
         if x > 0:

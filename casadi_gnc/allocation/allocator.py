@@ -60,11 +60,18 @@ class Allocator:
         self.problem = problem
 
     def update(self, **changes: Any) -> None:
-        """Change fields of the problem (bounds, weights, effectiveness) and keep the last forces."""
+        """Change fields of the problem (bounds, weights, effectiveness) and keep the last forces.
+
+        A back end that can also keeps what it knows of the last answer.
+        """
         try:
             changed = replace(self.problem, **changes)
         except TypeError as error:
             raise AllocationError(f"no such field of the problem: {error}") from error
+        warm = getattr(self._solver, "update", None)
+        if warm is not None and warm(changed):
+            self.problem = changed
+            return
         self._set_up(changed)
 
     def solve(self, command: Any, previous: Any = None, box: tuple[np.ndarray, np.ndarray] | None = None) -> Answer:

@@ -101,6 +101,7 @@ class OnlineSolver:
         self._c = c
         self._data = _aligned(c.allocator_data_size())
         self._work = _aligned(c.allocator_workspace_size())
+        self._tolerance = tolerance
         self._set_up(problem, tolerance)
         self.reset()
 
@@ -111,6 +112,13 @@ class OnlineSolver:
         numbers = (ctypes.c_double(problem.accuracy_weight), ctypes.c_double(tolerance))
         if self._c.allocator_setup(_pointer(self._data), *(_pointer(column) for column in columns), *numbers):
             raise AllocationError("the on-board solver refused the problem: weights, h or a number that is not finite")
+
+    def update(self, problem: AllocationProblem) -> bool:
+        """Take other data and keep the last answer as a start; False where the sizes differ."""
+        if sizes(problem) != self._sizes:
+            return False
+        self._set_up(problem, self._tolerance)
+        return True
 
     @property
     def memory(self) -> tuple[int, int]:

@@ -38,6 +38,8 @@ def allocate(
     case = load_allocation(problem)
     if stream == (commands is not None):
         raise AllocationError("give either --commands FILE or --stream")
+    for warning in case.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     allocator = allocating.CaseAllocator(case, backend, accuracy.value)
     tally = allocating.Tally()
     if stream:

@@ -160,6 +160,16 @@ class AllocationCase:
     keep_direction: bool
     least_force: float | None
 
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences on what a user should know before trusting the answers."""
+        strength = np.linalg.svd(self.problem.effectiveness, compute_uv=False)
+        rank = int(np.sum(strength > 1e-9 * max(strength[0], 1e-300)))
+        rows = len(self.problem.effectiveness)
+        if rank < rows:
+            return [f"the effectiveness has rank {rank} of {rows}: some effort cannot be made by any actuator"]
+        return []
+
 
 def load_allocation(problem: str | Path) -> AllocationCase:
     """Return the case of an allocation file, given by path or shipped name; raise `ProblemError`."""

@@ -184,7 +184,7 @@ class _Tape:
 
 
 class VirtualMachineEngine:
-    """Fly on CasADi's virtual machine: no compiler needed, some hundred times slower."""
+    """Fly on CasADi's virtual machine: no compiler needed, some fifty times slower."""
 
     name = "vm"
 

@@ -99,7 +99,7 @@ def fly(
         statuses=raised,
         made=made,
         seconds=seconds,
-        notes=(*mission.warnings, *notes, *_undefined(mission, values, raised)),
+        notes=(*notes, *_undefined(mission, values, raised)),
     )
 
 

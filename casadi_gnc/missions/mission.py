@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
 import casadi as ca
@@ -143,7 +143,6 @@ class Mission:
     title: str = ""
     source: str = ""
     digest: str = ""
-    warnings: tuple[str, ...] = field(default=())
 
     def scheme(self, name: str | None = None) -> Scheme:
         """Return a scheme by name, the first one by default."""

@@ -100,3 +100,19 @@ def test_update_keeps_the_last_forces(problem, rng):
     allocator.update(upper=0.5)
     assert np.array_equal(allocator.previous, first.forces)
     assert np.all(allocator.solve(rng.normal(size=3)).forces <= 0.5)
+
+
+def test_update_keeps_the_warm_start_of_the_on_board_solver(rng):
+    """New weights: the solver goes on from the last answer instead of starting cold, and is certified."""
+    from casadi_gnc.missions.allocation_file import load_allocation
+
+    problem = load_allocation("huang2020/allocation").problem
+    warm, cold = Allocator(problem, "online", accuracy="high"), Allocator(problem, "online", accuracy="high")
+    command = rng.uniform(-3e-4, 3e-4, 3)
+    last = warm.solve(command).forces
+    warm.update(accuracy_weight=1.001e6)
+    cold = Allocator(replace(problem, accuracy_weight=1.001e6), "online", accuracy="high")
+    answers = warm.solve(command, last), cold.solve(command, last)
+    assert all(answer.status.is_certified for answer in answers)
+    assert answers[0].iterations < answers[1].iterations
+    assert answers[0].objective == pytest.approx(answers[1].objective, rel=1e-7)

@@ -185,3 +185,14 @@ def test_options_of_the_file_are_used(tmp_path):
     path.write_text(text.replace("[weights]", "[options]\nleast_force_N = 1e-3\n[weights]"))
     answer = json.loads(run(str(path), "--stream", "--json", given="3e-4,0,1e-4\n").stdout)
     assert all(force == 0 or force >= 1e-3 * (1 - 1e-9) for force in answer["forces"])
+
+
+def test_rank_deficient_effectiveness_is_warned_of_and_solved(tmp_path):
+    path = tmp_path / "flat.toml"
+    path.write_text(
+        'format = 1\nkind = "allocation"\n[matrices]\nlower = 0.0\nupper = 1.0\n'
+        "effectiveness = [[1.0, -1.0, 0.5], [2.0, -2.0, 1.0]]\n"
+    )
+    done = run(str(path), "--stream", "--json", given="0.3 0.6\n")
+    assert "warning: the effectiveness has rank 1 of 2" in done.stderr
+    assert json.loads(done.stdout)["status"] == "OPTIMAL"

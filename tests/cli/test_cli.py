@@ -190,3 +190,41 @@ def test_reader_may_go_away():
         listing.stdout.close()
         assert listing.stderr.read() == ""
         listing.wait(timeout=60)
+
+
+def test_long_flight_shows_progress_on_a_terminal(tmp_path):
+    """A flight of more than a second draws a bar where standard error is a terminal."""
+    import pty
+
+    text = casadi_problem_text().replace('method = "robust",', 'method = "robust", backend = "clarabel",')
+    path = tmp_path / "slow.toml"
+    path.write_text(text.replace("duration_s = 1500.0", "duration_s = 500.0"))
+    master, slave = pty.openpty()
+    command = [
+        sys.executable,
+        "-m",
+        "casadi_gnc.cli.main",
+        "fly",
+        str(path),
+        "--out",
+        str(tmp_path / "o"),
+        "--no-plots",
+    ]
+    with subprocess.Popen([*command, "--scheme", "observer_robust"], stderr=slave, stdout=subprocess.DEVNULL) as flight:
+        os.close(slave)
+        shown = b""
+        try:
+            while chunk := os.read(master, 4096):
+                shown += chunk
+        except OSError:  # the other end closed, which is how a terminal says that it is over
+            pass
+        assert flight.wait(timeout=120) == 0
+    os.close(master)
+    assert b"observer_robust" in shown
+    assert b"%" in shown
+
+
+def casadi_problem_text() -> str:
+    from casadi_gnc.missions.loading import read
+
+    return read("huang2020/detumble")[1]

@@ -62,7 +62,11 @@ class Solver(Protocol):
     """One back end, set up for one problem."""
 
     def find(self, command: np.ndarray, previous: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Found:
-        """Return what the solver says of one sample."""
+        """Return what the solver says of one sample.
+
+        A solver may also have `update(problem) -> bool`: take other data and keep its warm start, or
+        return False to be set up again.
+        """
         ...
 
 

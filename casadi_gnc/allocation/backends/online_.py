@@ -21,6 +21,10 @@ class _Online:
     def __init__(self, solver: OnlineSolver) -> None:
         self._solver = solver
 
+    def update(self, problem: AllocationProblem) -> bool:
+        """Take other data of the same sizes and keep the warm start."""
+        return self._solver.update(problem)
+
     def find(self, command: np.ndarray, previous: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> Found:
         """Return the forces and vertex weights of the C."""
         raw = self._solver.solve(command, previous, lower, upper)
