@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from typing import Any
 
 import typer
 
@@ -11,9 +12,12 @@ def schema() -> None:
     """Print the JSON Schema of a problem file."""
     from pydantic import TypeAdapter
 
+    from casadi_gnc.missions import crafts
     from casadi_gnc.missions.allocation_file import AllocationModel
-    from casadi_gnc.missions.schema import MissionModel
 
-    described = TypeAdapter(MissionModel | AllocationModel).json_schema()
+    files: Any = AllocationModel
+    for name in crafts.names():
+        files = files | crafts.module(name).MissionFile
+    described = TypeAdapter(files).json_schema()
     content = {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
     typer.echo(json.dumps(content, indent=2))

@@ -20,17 +20,8 @@ from casadi_gnc.allocation.modes import axis_scale, by_priority
 from casadi_gnc.allocation.wheels import WheelSet, combine
 from casadi_gnc.errors import AllocationError, ProblemError
 from casadi_gnc.missions import loading, matrices
-from casadi_gnc.missions.schema import (
-    Format,
-    NonNegative,
-    Orientation,
-    Part,
-    Positive,
-    Rows,
-    Thrusters,
-    Vector,
-    orientation,
-)
+from casadi_gnc.missions.crafts.combined_spacecraft import Thrusters
+from casadi_gnc.missions.schema import Format, NonNegative, Orientation, Part, Positive, Rows, Vector, orientation
 from casadi_gnc.missions.toml_place import describe
 from casadi_gnc.thrusters import ThrusterGeometry
 

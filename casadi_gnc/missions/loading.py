@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from casadi_gnc import assets
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import LAWS
-from casadi_gnc.missions import building, schema, toml_place
+from casadi_gnc.missions import building, crafts, schema, toml_place
 from casadi_gnc.missions.mission import Mission
 
 
@@ -75,11 +75,21 @@ def load(problem: str | Path) -> Mission:
     if kind != "mission":
         place = toml_place.describe(path, text, ("kind",))
         raise ProblemError(f'kind is {kind!r}; only a file of kind "mission" can be flown', place)
+    return building.build(check(data, path, text), path, text)
+
+
+def check(data: dict[str, Any], path: Path, text: str) -> Any:
+    """Return the checked `MissionFile` of the craft that the data name; raise `ProblemError`."""
+    table = data.get("spacecraft")
+    name = table.get("model") if isinstance(table, dict) else None
+    if name is not None and name not in crafts.names():
+        place = toml_place.describe(path, text, ("spacecraft", "model"))
+        raise ProblemError(f"{name!r} is no craft; there is {', '.join(crafts.names())}", place)
+    file = crafts.module(name or crafts.names()[0]).MissionFile
     try:
-        model = schema.MissionModel.model_validate(data)
+        return file.model_validate(data)
     except ValidationError as error:
-        raise explain(error, path, text, data, schema.MissionModel) from None
-    return building.build(model, path, text)
+        raise explain(error, path, text, data, file) from None
 
 
 def explain(error: ValidationError, path: Path, text: str, data: dict[str, Any], top: Any) -> ProblemError:

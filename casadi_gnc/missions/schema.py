@@ -1,8 +1,8 @@
-"""What a mission file may say: keys, units, shapes and ranges.
+"""What every mission file may say: keys, units, shapes and ranges.
 
 SI units and radians throughout, with the unit in the key where it helps. Unknown keys are errors.
 The gains of a law are declared once, in the law's own file; their part of the schema is made from
-there.
+there. The tables of a craft are declared in its file in `casadi_gnc.missions.crafts`.
 """
 
 from __future__ import annotations
@@ -67,114 +67,6 @@ def orientation(model: Orientation) -> ca.DM | None:
     return None
 
 
-class Engine(Part):
-    """The orbit-control engine, in the chaser's frame."""
-
-    force_N: NonNegative
-    position_m: Vector
-    direction: Vector
-
-    _unit = field_validator("direction")(matrices.check_unit)
-
-
-class Thrusters(Part):
-    """Attitude thrusters in the chaser's frame; bounds hold for each."""
-
-    positions_m: Rows
-    directions: Rows
-    min_force_N: NonNegative = 0.0
-    max_force_N: Positive
-    max_force_rate_N_per_s: Positive | None = Field(default=None, description="no limit if left out")
-
-    @field_validator("directions")
-    @classmethod
-    def _are_units(cls, value: list[list[float]]) -> list[list[float]]:
-        return [matrices.check_unit(row, f"thruster {i}: ") for i, row in enumerate(value, 1)]
-
-    @model_validator(mode="after")
-    def _fit(self) -> Thrusters:
-        if len(self.positions_m) != len(self.directions):
-            raise ValueError(f"{len(self.positions_m)} positions but {len(self.directions)} directions")
-        if self.min_force_N > self.max_force_N:
-            raise ValueError(f"min_force_N {self.min_force_N} exceeds max_force_N {self.max_force_N}")
-        return self
-
-
-class BodyPartModel(Orientation):
-    """One part of the composed body (eq. 70); orientation is part frame -> combined frame."""
-
-    mass_kg: Positive
-    inertia_kg_m2: Matrix
-    position_m: Vector
-
-    _spd = field_validator("inertia_kg_m2")(matrices.check_inertia)
-
-
-class Spacecraft(Orientation):
-    """The craft as known: inertia, frames, engine and thrusters."""
-
-    model: Literal["combined_spacecraft"]
-    inertia_kg_m2: Matrix | None = Field(default=None, description="about the combined centre of mass, combined frame")
-    part: list[BodyPartModel] = Field(
-        default=[], description="parts from which the inertia is composed instead (eq. 70)"
-    )
-    centre_of_mass_m: Vector = Field(description="of the combined body from the chaser's, chaser frame")
-    rate_limit_rad_per_s: Positive = Field(default=10.0, description="larger measured rates per axis are rejected")
-    orbit_engine: Engine | None = None
-    thrusters: Thrusters
-
-    @field_validator("inertia_kg_m2")
-    @classmethod
-    def _spd(cls, value: list[list[float]] | None) -> list[list[float]] | None:
-        return None if value is None else matrices.check_inertia(value)
-
-    @model_validator(mode="after")
-    def _one_inertia(self) -> Spacecraft:
-        if (self.inertia_kg_m2 is None) == (not self.part):
-            raise ValueError("give either inertia_kg_m2 or one or more [[spacecraft.part]], not both")
-        return self
-
-
-class Truth(Part):
-    """How the real craft differs from the known one."""
-
-    inertia_factor: Positive = 1.0
-    inertia_kg_m2: Matrix | None = Field(default=None, description="true inertia, instead of a factor")
-    centre_of_mass_error_m: Vector = Field(default=[0.0, 0.0, 0.0], description="true minus known, chaser frame")
-
-    @field_validator("inertia_kg_m2")
-    @classmethod
-    def _spd(cls, value: list[list[float]] | None) -> list[list[float]] | None:
-        return None if value is None else matrices.check_inertia(value)
-
-
-class Believed(Orientation):
-    """What the flight software believes where that differs from the known craft."""
-
-    inertia_kg_m2: Matrix | None = None
-    centre_of_mass_m: Vector | None = None
-
-    @field_validator("inertia_kg_m2")
-    @classmethod
-    def _spd(cls, value: list[list[float]] | None) -> list[list[float]] | None:
-        return None if value is None else matrices.check_inertia(value)
-
-
-class Harmonic(Part):
-    """One harmonic of the disturbance torque."""
-
-    frequency_rad_per_s: Positive
-    amplitude_N_m: Vector
-
-
-class Environment(Part):
-    """What acts from outside."""
-
-    orbit_rate_rad_per_s: NonNegative = 0.0
-    constant_torque_N_m: Vector = [0.0, 0.0, 0.0]
-    harmonic: list[Harmonic] = []
-
-
 class FunnelModel(Part):
     """Bounds on a measured signal: -below rho < s < above rho, rho from start to floor."""
 
@@ -196,13 +88,6 @@ class FunnelModel(Part):
         return self
 
 
-class Initial(Part):
-    """State at t = 0."""
-
-    mrp: Vector
-    rate_rad_per_s: Vector
-
-
 class TimingModel(Part):
     """When things happen."""
 
@@ -217,25 +102,6 @@ class TimingModel(Part):
         if not samples <= 1e9 or abs(samples - round(samples)) > 1e-6 * samples:
             raise ValueError(f"duration_s / sample_period_s is {samples:.6g}; expected a whole number up to 1e9")
         return self
-
-
-class PinvModel(Part):
-    """Pseudo-inverse, then clip."""
-
-    method: Literal["pinv"]
-
-
-class RobustModel(Part):
-    """Robust min-max allocation against errors of the centre of mass."""
-
-    method: Literal["robust"]
-    backend: Literal["online", "clarabel"] = Field(default="online", description="online: the on-board solver, in C")
-    centre_of_mass_error_m: Annotated[list[NonNegative], Field(min_length=3, max_length=3)] = Field(
-        description="half width of the box of errors, chaser frame"
-    )
-    accuracy_weight: Positive = Field(default=1e6, description="h, weight of the squared torque error")
-    effort_weight: NonNegative = Field(default=1.0, description="diagonal of M1")
-    change_weight: NonNegative = Field(default=1.0, description="diagonal of M2")
 
 
 def _law_model(name: str, law: type[Law]) -> type[Part]:
@@ -263,7 +129,7 @@ LawModel = Annotated[
 
 
 class SchemeModel(Part):
-    """One way to fly the mission."""
+    """One way to fly the mission; a craft adds how it allocates."""
 
     name: Name
     title: str = ""
@@ -273,7 +139,6 @@ class SchemeModel(Part):
     as_printed: bool | list[str] = Field(default=False, description="keep the paper's errata: all, or those named")
     torque_limit_N_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
     law: LawModel  # type: ignore[valid-type]
-    allocation: Annotated[PinvModel | RobustModel, Field(discriminator="method")]
 
 
 class MetricModel(Part):
@@ -293,23 +158,17 @@ class MetricModel(Part):
 
 
 class MissionModel(Part):
-    """A mission file."""
+    """What every mission file has; a craft adds its own tables, and `scheme` (`casadi_gnc.missions.crafts`)."""
 
     format: Format
     kind: Literal["mission"]
     title: str = ""
     source: str = ""
-    spacecraft: Spacecraft
-    truth: Truth = Truth()
-    believed: Believed = Believed()
-    environment: Environment = Environment()
-    initial: Initial
     funnel: FunnelModel | None = None
     timing: TimingModel
-    scheme: Annotated[list[SchemeModel], Field(min_length=1)]
     metric: list[MetricModel] = []
 
-    @field_validator("scheme")
+    @field_validator("scheme", check_fields=False)
     @classmethod
     def _names_of_files(cls, value: list[Any]) -> list[Any]:
         for item in value:
@@ -317,7 +176,7 @@ class MissionModel(Part):
                 raise ValueError(f"a scheme cannot be named {item.name!r}: a file of the results is called so")
         return value
 
-    @field_validator("scheme", "metric")
+    @field_validator("scheme", "metric", check_fields=False)
     @classmethod
     def _names_differ(cls, value: list[Any]) -> list[Any]:
         names = [item.name for item in value]

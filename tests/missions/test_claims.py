@@ -6,8 +6,7 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.missions.building import build
-from casadi_gnc.missions.loading import read
-from casadi_gnc.missions.schema import MissionModel
+from casadi_gnc.missions.loading import check, read
 from casadi_gnc.status import StepStatus
 
 
@@ -61,7 +60,7 @@ def test_robust_allocation_against_five_centimetres():
     path, text, data = read("huang2020/detumble")
     data["scheme"] = [scheme for scheme in data["scheme"] if scheme["name"] == "observer_robust"]
     data["scheme"][0]["allocation"]["centre_of_mass_error_m"] = [0.05, 0.05, 0.05]
-    flight = casadi_gnc.fly(build(MissionModel.model_validate(data), path, text))
+    flight = casadi_gnc.fly(build(check(data, path, text), path, text))
     assert 780 <= flight.metrics["settling_time"] <= 825
     assert flight.metrics["steady_rate"] < 5e-6
     assert flight.metrics["torque_sample_sum"] == pytest.approx(15.34, rel=0.02)

@@ -1,0 +1,53 @@
+"""Crafts: one file each, with the tables of a mission file that describe it and how they are built.
+
+A craft's module has
+
+* `MissionFile`: a `MissionModel` with the tables of this craft, `spacecraft.model` naming it;
+* `build(model, where)`: returns a `Craft`, or raises `ProblemError` with `where(key)` as its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from casadi_gnc.missions.mission import Actuation, Plant
+
+#: Path of a key in the file -> "file, line n, key", for messages.
+Where = Callable[[tuple[str | int, ...]], str]
+
+
+@dataclass(frozen=True, eq=False)
+class Craft:
+    """Hold what a mission needs of a craft.
+
+    Parameters
+    ----------
+    plant : the truth.
+    start : its state at t = 0.
+    start_keys : key of the file, in [initial], that gives each measured signal.
+    believed : what the flight software believes; given to laws as `body`.
+    actuation : makes the actuation of a scheme from the scheme's table.
+    """
+
+    plant: Plant
+    start: list[float]
+    start_keys: dict[str, str]
+    believed: Any
+    actuation: Callable[[Any], Actuation]
+
+
+#: Modules by the name that `spacecraft.model` gives.
+_HOMES = {"combined_spacecraft": "combined_spacecraft"}
+
+
+def names() -> list[str]:
+    """Return the names of all crafts."""
+    return list(_HOMES)
+
+
+def module(name: str) -> Any:
+    """Return the module of a craft; raise `KeyError` if there is none of that name."""
+    return import_module(f"{__name__}.{_HOMES[name]}")
