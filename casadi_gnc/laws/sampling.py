@@ -20,6 +20,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc import exact
+from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.laws._law import Law
 
 
@@ -37,7 +38,9 @@ def advance(law: Law, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any
         moved[affine] = symbol[affine] + exactly
     others = [row for row in range(law.memory.size) if row not in affine]
     if others:
-        moved[others] = _runge_kutta(law, t, y, symbol, wanted, achieved)[others]
+        # The measurement is held, and so is the time at which the law sees it.
+        stepped = runge_kutta(lambda _, at: law.rate(t, y, at, wanted, achieved), t, symbol, law.hold)
+        moved[others] = stepped[others]
     return ca.substitute(moved, symbol, m)
 
 
@@ -76,16 +79,3 @@ def _phi1(a: ca.SX) -> ca.SX:
 
 def _number_or_symbol(entry: ca.SX) -> Any:
     return float(entry) if entry.is_constant() else entry
-
-
-def _runge_kutta(law: Law, t: Any, y: Any, m: ca.SX, wanted: Any, achieved: Any) -> ca.SX:
-    h = law.hold
-
-    def rate(at: Any) -> Any:
-        return law.rate(t, y, at, wanted, achieved)
-
-    k1 = rate(m)
-    k2 = rate(m + h / 2 * k1)
-    k3 = rate(m + h / 2 * k2)
-    k4 = rate(m + h * k3)
-    return m + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)

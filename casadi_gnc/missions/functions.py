@@ -12,6 +12,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.errors import FlightError
+from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.laws import advance
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.mission import Mission, Scheme
@@ -74,7 +75,7 @@ def closed_loop_function(mission: Mission, scheme: Scheme, parameters: Sequence[
     c = _controller(mission, scheme, s)
     x, h = s.x, mission.timing.sample_period / mission.timing.substeps
     for i in range(mission.timing.substeps):
-        x = tapes.runge_kutta(lambda t, at: mission.truth.rate(t, at, c["force"]), s.t + i * h, x, h)
+        x = runge_kutta(lambda t, at: mission.truth.rate(t, at, c["force"]), s.t + i * h, x, h)
     outputs = {"x_next": mission.truth.settle(x), "m_next": c["memory_next"], "force_next": c["force"]}
     outputs.update(good_next=c["accepted"], wanted=c["wanted"], limited=c["limited"])
     return _function("closed_loop", ports, outputs, parameters)

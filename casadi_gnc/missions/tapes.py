@@ -32,6 +32,7 @@ import casadi as ca
 
 from casadi_gnc import bounds
 from casadi_gnc.errors import FlightError
+from casadi_gnc.integrators import join, runge_kutta
 from casadi_gnc.laws import advance
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.mission import Mission, Scheme
@@ -229,15 +230,6 @@ def _observe(mission: Mission, scheme: Scheme, s: Any) -> ca.Function:
     return function("observe", {**ports, "flags": flags, "allocation_flags": allocation, "report": noted}, {"row": row})
 
 
-def runge_kutta(rate: Any, t: Any, x: Any, h: Any) -> Any:
-    """Return x after one classical Runge-Kutta step of x' = rate(t, x)."""
-    k1 = rate(t, x)
-    k2 = rate(t + h / 2, x + h / 2 * k1)
-    k3 = rate(t + h / 2, x + h / 2 * k2)
-    k4 = rate(t + h, x + h * k3)
-    return x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-
-
 def build(mission: Mission, scheme: Scheme) -> Tapes:
     """Return all tapes of a scheme in the mission's mode."""
     s, plant, law, timing = Symbols(mission, scheme), mission.truth, scheme.law, mission.timing
@@ -276,7 +268,7 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
 def _integrator(size: int, h: float) -> dict[str, ca.Function]:
     state, slope, length = ca.SX.sym("state", size), ca.SX.sym("slope", size), ca.SX.sym("length")
     k = [ca.SX.sym(f"k{i}", size) for i in range(1, 5)]
-    joined = state + h / 6 * (k[0] + 2 * k[1] + 2 * k[2] + k[3])
+    joined = join(state, h, *k)
     return {
         "point": function(
             "point", {"state": state, "slope": slope, "length": length}, {"moved": state + length * slope}

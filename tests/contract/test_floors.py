@@ -22,6 +22,7 @@ FLOORS = {
             "assets",
             "compilers",
             "files",
+            "integrators",
             "signals",
             "bounds",
             "attitude",

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc import attitude
-from casadi_gnc.missions.tapes import runge_kutta
+from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
 from casadi_gnc.rigid_body import RigidBody
 
