@@ -91,7 +91,12 @@ class Layout:
         raise KeyError(f"no signal {name!r}; there is {', '.join(self.names) or 'none'}")
 
     def split(self, column: Any) -> SimpleNamespace:
-        """Return the signals of a column as attributes; works on SX, MX, DM and numpy columns."""
+        """Return the signals of a column as attributes; works on SX, MX, DM and numpy columns.
+
+        Raises `ValueError` for a column of another length.
+        """
+        if column.shape[0] != self.size:
+            raise ValueError(f"a column of {column.shape[0]} rows, expected {self.size} ({', '.join(self.names)})")
         return SimpleNamespace(**{name: column[self.place(name)] for name in self.names})
 
     def pack(self, **parts: Any) -> Any:

@@ -8,6 +8,8 @@ What flies is a CasADi function, so analysis needs no second model:
    gradient is compared with central differences.
 """
 
+import dataclasses
+
 import casadi as ca
 import numpy as np
 
@@ -17,9 +19,9 @@ import casadi_gnc
 def linearise() -> np.ndarray:
     """Return the poles of the sampled loop (in z) after a minute at rest under its disturbance."""
     mission = casadi_gnc.load("huang2020/detumble")
-    loop, start = mission.closed_loop("observer_pinv"), ca.DM.zeros(6)
-    state = {"x": start, "m": mission.scheme("observer_pinv").law.start(0.0, start[3:])}
-    state.update(force=ca.DM.zeros(12), good=start)
+    loop = mission.closed_loop("observer_pinv")
+    calm = dataclasses.replace(mission, start=[0.0] * 6)
+    state = calm.loop_start("observer_pinv")
     for k in range(600):
         found = loop(t=k * mission.timing.sample_period, **state)
         state = {name: found[f"{name}_next"] for name in state}
@@ -36,8 +38,7 @@ def flight_cost() -> ca.Function:
     gain = ca.SX.sym("k2")
     tuned = mission.with_scheme("funnel_pinv", rate_gain=gain)
     loop = tuned.closed_loop(parameters=[gain])
-    x = ca.DM(mission.start)
-    state = {"x": x, "m": tuned.scheme().law.start(0.0, x), "force": ca.DM.zeros(12), "good": x}
+    state = tuned.loop_start()
     k2, cost = ca.MX.sym("k2"), 0
     for k in range(mission.timing.samples - 1):
         found = loop(t=k * mission.timing.sample_period, p=k2, **state)

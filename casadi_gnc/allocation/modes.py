@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from casadi_gnc.allocation.allocator import Allocator, solve
-from casadi_gnc.allocation.answer import ACCURACIES, Answer, certify
+from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
 
@@ -63,9 +63,12 @@ def by_priority(problem: AllocationProblem, priorities: Sequence[int], ratio: fl
 
     The rows of the result are scaled: give it commands scaled by `axis_scale`.
     """
-    if len(priorities) != len(problem.effectiveness) or min(priorities) < 0 or not ratio > 1:
+    if not ratio > 1:
+        raise AllocationError(f"the ratio between priorities is {ratio}, expected more than 1")
+    if len(priorities) != len(problem.effectiveness) or min(priorities) < 0:
         raise AllocationError(
-            f"{len(priorities)} priorities for {len(problem.effectiveness)} rows, or a ratio of {ratio}, not above 1"
+            f"{len(priorities)} priorities for {len(problem.effectiveness)} rows of effort; expected one whole number "
+            "from 0 for each"
         )
     scale = axis_scale(priorities, ratio)
     return replace(
@@ -90,7 +93,8 @@ def with_minimum_impulse(
 
     Forces inside the dead band are rounded to its nearer end and fixed, largest first, and the rest
     allocated again until none is left inside. `duality_gap` bounds the cost above the optimum of the
-    problem *without* the dead band: what the dead band costs at most.
+    problem *without* the dead band: what the dead band costs at most. The status is OPTIMAL only where
+    that is next to nothing.
     """
     if not least >= 0 or np.any(problem.lower < 0):
         raise AllocationError("a minimum impulse needs least >= 0 and actuators that push one way (lower >= 0)")
@@ -110,15 +114,15 @@ def with_minimum_impulse(
     forces = np.where(answer.forces < least / 2, np.maximum(0.0, problem.lower), answer.forces)
     u = np.asarray(command, dtype=float)
     cost = problem.objective(forces, u, last)
-    _, _, _, status = certify(
-        problem, u, last, relaxed.forces, relaxed.vertex_weights, ACCURACIES["mid"], problem.box(last)
+    gap = cost - (relaxed.objective - relaxed.duality_gap)
+    certified = gap <= max(
+        ACCURACIES["mid"][0] * cost, ACCURACIES["mid"][1] * problem.accuracy_weight * problem.full_effort**2
     )
-    bound = relaxed.objective - relaxed.duality_gap
     return replace(
         answer,
         forces=forces,
         objective=cost,
-        duality_gap=cost - bound,
+        duality_gap=gap,
         unallocated=u - problem.effectiveness @ forces,
-        status=status,
+        status=AllocationStatus.OPTIMAL if certified else AllocationStatus.NOT_CERTIFIED,
     )

@@ -160,7 +160,7 @@ class AllocationProblem:
         return self.effectiveness + np.einsum("vrp,pn->vrn", self.errors, self.coupling)
 
     def vertex_costs(self, forces: np.ndarray, command: np.ndarray) -> np.ndarray:
-        """Return h |u - (A + D_v E) F|^2 for every vertex, (V,)."""
+        """Return ``h |u - (A + D_v E) F|^2`` for every vertex, (V,)."""
         missing = command - self.vertices @ forces
         return self.accuracy_weight * np.einsum("vr,vr->v", missing, missing)
 

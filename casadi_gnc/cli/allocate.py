@@ -79,6 +79,7 @@ def _stream(allocator: CaseAllocator, tally: Tally, *, json: bool) -> None:
     from casadi_gnc.missions import allocating
 
     rows = len(allocator.case.row_scale)
+    names = ",".join(f"u{i}" for i in range(1, rows + 1))
 
     def say(line: str) -> None:
         sys.stdout.write(line + "\n")
@@ -86,7 +87,7 @@ def _stream(allocator: CaseAllocator, tally: Tally, *, json: bool) -> None:
 
     try:
         for number, line in enumerate(sys.stdin, 1):
-            if not line.strip():
+            if not line.strip() or (number == 1 and line.strip() == names):
                 continue
             try:
                 command = allocating.parse_line(line, rows)
@@ -115,6 +116,7 @@ def _print_summary(tally: Tally, *, as_json: bool, to_stderr: bool) -> None:
     statuses = ", ".join(f"{count} {name}" for name, count in found["statuses"].items()) or "no answers"
     latency = ", ".join(f"{name.removesuffix('_us')} {value:g}" for name, value in found["latency"].items())
     malformed = f"; {tally.malformed} malformed lines" if tally.malformed else ""
-    typer.echo(f"{statuses}{malformed}; worst certified relative gap {tally.worst_gap:.2g}", err=to_stderr)
+    gap = "" if tally.worst_gap is None else f"; largest relative gap {tally.worst_gap:.2g}"
+    typer.echo(f"{statuses}{malformed}{gap}", err=to_stderr)
     if latency:
         typer.echo(f"latency [us]: {latency}", err=to_stderr)

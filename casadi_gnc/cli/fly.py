@@ -10,7 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from casadi_gnc.missions.flight import Flight
-    from casadi_gnc.missions.mission import Mission
+    from casadi_gnc.missions.mission import Metric, Mission
 
 
 class EngineChoice(str, Enum):
@@ -36,7 +36,7 @@ class ModeChoice(str, Enum):
 
 def fly(
     problem: Annotated[str, typer.Argument(help="A problem file, or the name of a shipped one.")],
-    out: Annotated[Path, typer.Option(help="Folder for signals, summary and pictures.")] = Path("out"),
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; out/<mission> if left out.")] = None,
     scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
     engine: Annotated[EngineChoice, typer.Option(help="Compiled C, or CasADi's virtual machine.")] = EngineChoice.c,
     math: Annotated[
@@ -55,7 +55,7 @@ def fly(
 
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
-    folder = prepare_folder(out)
+    folder = prepare_folder(Path("out") / mission.name if out is None else out)
     flights, written = [], []
     for name in dict.fromkeys(chosen):
         with _Progress(name, quiet=json) as progress:
@@ -73,6 +73,8 @@ def fly(
         typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
     else:
         _print(mission, flights, written)
+    if any(flight.diverged for flight in flights):
+        raise typer.Exit(1)
 
 
 def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
@@ -121,13 +123,13 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
 
     console = Console(soft_wrap=True)
     table = Table(title=escape(mission.title or mission.name))
-    table.add_column("scheme")
+    table.add_column("scheme", no_wrap=True)
     for metric in mission.metrics:
         unit = f" [{metric.unit}]" if metric.unit else ""
         table.add_column((metric.name.replace("_", " ") + unit).replace("[", r"\["), justify="right")
     for flight in flights:
         values = [flight.metrics[metric.name] for metric in mission.metrics]
-        table.add_row(flight.scheme, *("never" if value is None else f"{value:.5g}" for value in values))
+        table.add_row(flight.scheme, *(_shown(m, v) for m, v in zip(mission.metrics, values, strict=True)))
     console.print(table, soft_wrap=False)
     for flight in flights:
         for bit, (count, first) in flight.statuses.items():
@@ -139,4 +141,11 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
             )
         for note in flight.notes:
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
-    console.print("wrote " + ", ".join(str(path) for path in written), highlight=False, markup=False)
+    names = ", ".join(path.name for path in written)
+    console.print(f"wrote to {written[0].parent}: {names}", highlight=False, markup=False)
+
+
+def _shown(metric: Metric, value: float | None) -> str:
+    if value is not None:
+        return f"{value:.5g}"
+    return "never" if metric.kind == "settling" else "-"

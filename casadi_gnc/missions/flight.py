@@ -49,6 +49,15 @@ class Flight:
         block = self.block(name)
         return block[:, 0] if block.shape[1] == 1 else block
 
+    def __repr__(self) -> str:
+        kept, columns = self.samples.shape
+        return f"Flight({self.mission}, {self.scheme}: {kept} samples of {columns} numbers, {self.metrics})"
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the simulated state ran away; then no metric has a value."""
+        return StepStatus.DIVERGED in self.statuses
+
     @property
     def time(self) -> np.ndarray:
         """Sample times, (K,), [s]."""

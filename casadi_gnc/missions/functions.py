@@ -79,3 +79,11 @@ def closed_loop_function(mission: Mission, scheme: Scheme, parameters: Sequence[
     outputs = {"x_next": mission.truth.settle(x), "m_next": c["memory_next"], "force_next": c["force"]}
     outputs.update(good_next=c["accepted"], wanted=c["wanted"], limited=c["limited"])
     return _function("closed_loop", ports, outputs, parameters)
+
+
+def loop_start(mission: Mission, scheme: Scheme) -> dict[str, ca.DM]:
+    """Return x, m, force and good at t = 0: the mission's start, the law's first memory, forces at rest."""
+    x = ca.DM(mission.start)
+    y = ca.DM(mission.truth.measure(0.0, x))
+    memory = ca.DM(scheme.law.start(0.0, tapes.law_inputs(mission, scheme, y)))
+    return {"x": x, "m": memory, "force": ca.DM.zeros(mission.truth.inputs.size), "good": y}

@@ -118,6 +118,15 @@ def explain(error: ValidationError, path: Path, text: str, data: dict[str, Any],
         message = first["msg"][0].lower() + first["msg"][1:]
         if not isinstance(at, (dict, list)):
             message += f", got {at!r}"
+        if first["type"] == "list_type" and isinstance(key[-1], int):
+            message += "; a matrix is written as rows, [[a, 0, 0], [0, b, 0], [0, 0, c]]"
+    if first["type"] == "union_tag_invalid":
+        told: Any = first.get("ctx", {})
+        kinds = told["expected_tags"].replace("'", "").split(", ")
+        near = difflib.get_close_matches(str(told["tag"]), kinds, 1)
+        message = f"unknown {told['discriminator']} {told['tag']!r}".replace("''", "'") + (
+            f"; did you mean {near[0]}?" if near else f"; known: {', '.join(kinds)}"
+        )
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return ProblemError(message + more, toml_place.describe(path, text, tuple(key)))
 

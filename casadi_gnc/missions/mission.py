@@ -194,8 +194,20 @@ class Mission:
 
         return functions.step_function(self, self.scheme(scheme), parameters)
 
+    def loop_start(self, scheme: str | None = None) -> dict[str, ca.DM]:
+        """Return x, m, force and good at t = 0, as `closed_loop` takes them."""
+        from casadi_gnc.missions import functions
+
+        return functions.loop_start(self, self.scheme(scheme))
+
     def closed_loop(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
-        """Return one sample period of the loop: (t, x, m, force, good, [p]) -> the same, later."""
+        """Return one sample period of the loop: (t, x, m, force, good, [p]) -> the same, later.
+
+        Ports: `t` [s]; `x`, the plant's state in the order of `truth.state`; `m`, the law's memory;
+        `force`, the previous forces; `good`, the last good measurement. Results: `x_next`, `m_next`,
+        `force_next`, `good_next`, `wanted`, `limited`. `loop_start` gives the first values. Only schemes
+        whose allocation is an expression ("pinv") have a closed loop.
+        """
         from casadi_gnc.missions import functions
 
         return functions.closed_loop_function(self, self.scheme(scheme), parameters)

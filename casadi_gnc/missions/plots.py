@@ -36,7 +36,12 @@ def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
         _rate(top, mission, flight)
     _torque(middle, mission, flight)
     _forces(bottom, mission, flight)
-    figure.suptitle(_plain(flight.title), fontsize=_FONT + 1, x=0.02, ha="left")
+    figure.suptitle(
+        _plain(f"{mission.title}: {flight.title}" if mission.title else flight.title),
+        fontsize=_FONT + 1,
+        x=0.02,
+        ha="left",
+    )
     bottom.set_xlabel("time [s]")
     return _save(figure, folder / f"{flight.scheme}.png")
 
@@ -58,7 +63,7 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
         [(1.0, "wall of the funnel")] if funnel else [(t, f"settled below {t:g} rad/s") for t in thresholds]
     ):
         axes.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=text)
-    axes.set_ylabel("share of the funnel used [-]" if funnel else "largest |rate| [rad/s]")
+    axes.set_ylabel("share of the funnel used [-]" if funnel else "largest rate component [rad/s]")
     axes.set_xlabel("time [s]")
     axes.set_title(_plain(mission.title), fontsize=_FONT + 1, loc="left")
     figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)

@@ -48,8 +48,10 @@ def test_table_in_table_out(commands, tmp_path, backend):
         assert np.all((forces >= 0) & (forces <= 3.75e-3))
         assert np.allclose(command - problem.effectiveness @ forces, missing, atol=1e-15)
         assert answer["status"] == ("NOT_CERTIFIED" if backend == "pinv" else "OPTIMAL")
-    if backend != "pinv":
-        assert summary["worst_relative_gap"] <= 1e-6
+    if backend == "pinv":
+        assert summary["largest_relative_gap"] > 0.1
+    else:
+        assert summary["largest_relative_gap"] <= 1e-6
 
 
 def test_back_ends_agree(commands, tmp_path):
@@ -137,7 +139,10 @@ def test_bad_input_is_told(commands, tmp_path):
     path, _ = commands
     bad = tmp_path / "bad.csv"
     bad.write_text("u1,u3\n1,2\n")
-    told(run(CASE, "--commands", str(bad)), "bad.csv: column u2 is missing; expected u1, u2, u3, found u1, u3")
+    told(
+        run(CASE, "--commands", str(bad)),
+        "bad.csv: column u2 is missing in the first line; expected u1, u2, u3, found u1, u3",
+    )
     bad.write_text("u1,u2,u3\n1,2,3\n1,x,3\n")
     told(run(CASE, "--commands", str(bad)), "bad.csv, line 3, column u2: 'x' is no number")
     bad.write_text("u1,u2,u3\n")

@@ -13,9 +13,7 @@ def test_closed_loop_repeats_the_flight(detumble):
     """Folding closed_loop over samples gives the flown states (libm on both sides)."""
     flight = casadi_gnc.fly(detumble, "observer_pinv", maths="libm")
     loop = detumble.closed_loop("observer_pinv")
-    x = np.array(detumble.start)
-    start = detumble.scheme("observer_pinv").law.start(0.0, ca.DM(x[3:]))
-    state = {"x": x, "m": start, "force": np.zeros(12), "good": x}
+    state = detumble.loop_start("observer_pinv")
     for k in range(50):
         found = loop(t=k * 0.1, **state)
         assert np.allclose(np.array(state["x"]).ravel(), np.hstack([flight["mrp"][k], flight["rate"][k]]), atol=1e-13)
@@ -51,3 +49,9 @@ def test_solver_in_the_loop_has_no_closed_form(detumble):
         detumble.with_timing(mode="continuous").step("observer_pinv")
     with pytest.raises(FlightError, match="no scheme 'x' in detumble; there is damping_pinv"):
         detumble.scheme("x")
+
+
+def test_columns_of_the_wrong_length_are_refused(detumble):
+    law = detumble.scheme("observer_pinv").law
+    with pytest.raises(ValueError, match=r"a column of 6 rows, expected 3 \(rate\)"):
+        law.start(0.0, ca.DM.zeros(6))

@@ -1,0 +1,35 @@
+"""Snippets of the documentation run as they stand."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from casadi_gnc.missions.allocation_file import load_allocation
+
+ROOT = Path(__file__).parents[1]
+PYTHON = [
+    (path.name, block)
+    for path in (ROOT / "README.md", ROOT / "docs" / "allocation.md")
+    for block in re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
+]
+
+
+@pytest.mark.parametrize(("name", "block"), PYTHON, ids=[name for name, _ in PYTHON])
+def test_python_snippets_run(name, block):
+    exec(compile(block, name, "exec"), {})
+
+
+def test_the_example_of_an_allocation_file_loads(tmp_path):
+    text = (ROOT / "docs" / "allocation.md").read_text(encoding="utf-8")
+    (example,) = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "format = 1" in block]
+    path = tmp_path / "wheels.toml"
+    path.write_text(example)
+    assert load_allocation(path).problem.count == 4
+
+
+def test_links_lead_to_files():
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")):
+        for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
+            if "://" not in target:
+                assert (page.parent / target).exists(), f"{page.name} -> {target}"
