@@ -37,7 +37,7 @@ def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
     _torque(middle, mission, flight)
     _forces(bottom, mission, flight)
     figure.suptitle(
-        _plain(f"{mission.title}: {flight.title}" if mission.title else flight.title),
+        _plain(f"{mission.title}\n{flight.title}" if mission.title else flight.title),
         fontsize=_FONT + 1,
         x=0.02,
         ha="left",
@@ -135,8 +135,13 @@ def _inside_funnel(axes: Any, flight: Flight, signal: str) -> None:
         for wall in ("funnel_lower", "funnel_upper"):
             axes.plot(*_thin(flight.time, flight[wall][:, i]), color=COLOURS[i], linestyle="--", linewidth=0.9)
     axes.plot([], [], color="0.3", linestyle="--", linewidth=0.9, label="funnel")
-    axes.set_yscale("symlog", linthresh=1e-3)
-    axes.set_ylim(-1, 1)
+    # Logarithmic down to the walls' last width, so that the end of the flight can be seen too.
+    narrowest = float(np.min(np.abs([flight["funnel_lower"][-1], flight["funnel_upper"][-1]])))
+    threshold = 10.0 ** np.floor(np.log10(max(narrowest, 1e-12)))
+    axes.set_yscale("symlog", linthresh=threshold)
+    decades = np.arange(np.log10(threshold), 0.5, 2)
+    axes.set_yticks([*-(10.0 ** decades[::-1]), 0.0, *10.0**decades])
+    axes.minorticks_off()
     axes.set_ylabel("attitude MRP [-]" if signal == "mrp" else f"{signal} [{flight.unit(signal)}]")
     _legend(axes, 4)
 
