@@ -73,6 +73,8 @@ class Allocator:
             self.problem = changed
             return
         self._set_up(changed)
+        if len(self.previous) != changed.count:
+            self.previous = np.clip(np.zeros(changed.count), changed.lower, changed.upper)
 
     def solve(self, command: Any, previous: Any = None, box: tuple[np.ndarray, np.ndarray] | None = None) -> Answer:
         """Return the allocation of a command.
@@ -97,6 +99,7 @@ class Allocator:
             raise AllocationError(
                 f"command has shape {u.shape}, expected ({rows},); previous {last.shape}, expected ({problem.count},)"
             )
+        box = None if box is None else self._checked(box)
         started = time.perf_counter()
         wanted, known = np.abs(u) <= LARGEST, np.abs(last) <= LARGEST  # false for NaN
         if not (np.all(wanted) and np.all(known)):
@@ -112,6 +115,17 @@ class Allocator:
         lower, upper = problem.box(last) if box is None else box
         return self._answer(u, last, self._solver.find(u, last, lower, upper), None, started, (lower, upper))
 
+    def _checked(self, box: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        lower, upper = (np.array(bound, dtype=float) for bound in box)
+        count = self.problem.count
+        if lower.shape != (count,) or upper.shape != (count,):
+            raise AllocationError(f"box has shapes {lower.shape} and {upper.shape}, expected ({count},) twice")
+        if not np.all(lower <= upper) or not np.all(np.isfinite(lower) & np.isfinite(upper)):
+            raise AllocationError("box has a lower bound above its upper one, or a bound that is not finite")
+        return lower, upper
+
+    # Weights may be so large that costs overflow; such a cost is judged, not warned of.
+    @np.errstate(over="ignore", invalid="ignore")
     def _answer(
         self,
         u: np.ndarray,

@@ -17,7 +17,9 @@ class AllocationStatus(Enum):
     """How an allocation ended; the value is the sentence for the reader."""
 
     OPTIMAL = "The forces are optimal to the tolerance, by our certificate."
-    AT_ROUNDING = "The forces are optimal to the rounding floor of the arithmetic, by our certificate."
+    AT_ROUNDING = (
+        "The forces are optimal to the floor of the accuracy, a share of the full effort's cost, by our certificate."
+    )
     NOT_CERTIFIED = "The forces are feasible, but the certificate does not reach the tolerance; see the gap."
     FAILED = "The solver returned nothing usable; the previous forces were kept inside the bounds."
     BAD_COMMAND = "The command or the previous forces are not finite; the previous forces were kept inside the bounds."
@@ -99,8 +101,7 @@ def certify(
     """
     sample = (command, previous, *box)
     cost = problem.objective(forces, command, previous)
-    floor = accuracy[1] * problem.accuracy_weight * max(problem.full_effort, float(np.linalg.norm(command))) ** 2
-    enough = max(accuracy[0] * cost, floor)
+    enough = max(accuracy[0] * cost, floor_of(problem, command, accuracy))
     lam, gap = np.full(len(problem.errors), 1 / len(problem.errors)), np.inf
     usable = weights is not None and np.shape(weights) == np.shape(lam) and np.all(np.isfinite(weights))
     if weights is not None and usable and np.max(weights) > 0:
@@ -110,10 +111,26 @@ def certify(
         other = best_weights(problem, forces, *sample)
         better = problem.gap(forces, other, *sample)
         lam, gap = (other, better) if not gap <= better else (lam, gap)
+    return cost, gap, lam, judge(problem, command, cost, gap, accuracy)
+
+
+def floor_of(problem: AllocationProblem, command: np.ndarray, accuracy: tuple[float, float]) -> float:
+    """Return the gap that is allowed whatever the cost: a share of the cost of missing the full effort."""
+    effort = np.float64(max(problem.full_effort, float(np.linalg.norm(command))))
+    with np.errstate(over="ignore"):
+        return float(accuracy[1] * problem.accuracy_weight * effort**2)
+
+
+def judge(
+    problem: AllocationProblem, command: np.ndarray, cost: float, gap: float, accuracy: tuple[float, float]
+) -> AllocationStatus:
+    """Return the status that a cost and its gap deserve; numbers that are not finite prove nothing."""
+    floor = floor_of(problem, command, accuracy)
+    if not (np.isfinite(cost) and np.isfinite(gap) and np.isfinite(floor)):
+        return AllocationStatus.NOT_CERTIFIED
     if gap <= accuracy[0] * cost:
-        return cost, gap, lam, AllocationStatus.OPTIMAL
-    status = AllocationStatus.AT_ROUNDING if gap <= floor else AllocationStatus.NOT_CERTIFIED
-    return cost, gap, lam, status
+        return AllocationStatus.OPTIMAL
+    return AllocationStatus.AT_ROUNDING if gap <= floor else AllocationStatus.NOT_CERTIFIED
 
 
 def best_weights(

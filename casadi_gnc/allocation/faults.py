@@ -149,7 +149,9 @@ def worst_alignment(
     worst = Alignment(np.inf, tried[0], 0)
     for direction in tried:
         forces = allocator.solve(radius * direction, rest).forces
-        shares = (truth.vertices @ (forces - rest)) @ direction / radius
+        # Dead and stuck actuators of the truth do not follow their command.
+        moved = np.clip(forces, truth.lower, truth.upper) - np.clip(rest, truth.lower, truth.upper)
+        shares = (truth.vertices @ moved) @ direction / radius
         vertex = int(np.argmin(shares))
         if shares[vertex] < worst.share:
             worst = Alignment(float(shares[vertex]), direction, vertex)

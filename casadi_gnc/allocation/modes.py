@@ -16,8 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from casadi_gnc.allocation.allocator import Allocator, solve
-from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer
+from casadi_gnc.allocation.allocator import LARGEST, Accuracy, Allocator
+from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, judge, saturation
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
 
@@ -45,7 +45,7 @@ def along_direction(
     """Return the allocation of s u and s, with s the largest share of the command that is attainable."""
     last = allocator.previous if previous is None else np.asarray(previous, dtype=float)
     command = np.asarray(command, dtype=float)
-    if not np.all(np.isfinite(command)):
+    if not (np.all(np.abs(command) <= LARGEST) and np.all(np.abs(last) <= LARGEST)):
         return allocator.solve(command, last), 0.0
     share = largest_scale(allocator.problem, command, last)
     answer = allocator.solve(share * command, last)
@@ -71,6 +71,10 @@ def by_priority(problem: AllocationProblem, priorities: Sequence[int], ratio: fl
             "from 0 for each"
         )
     scale = axis_scale(priorities, ratio)
+    if scale.min() < 1e-6:
+        raise AllocationError(
+            f"priorities {list(priorities)} with ratio {ratio:g} leave an axis less than 1e-12 of its weight"
+        )
     return replace(
         problem, effectiveness=scale[:, None] * problem.effectiveness, errors=scale[None, :, None] * problem.errors
     )
@@ -88,41 +92,44 @@ def with_minimum_impulse(
     previous: np.ndarray | None = None,
     *,
     backend: str = "clarabel",
+    accuracy: Accuracy = "mid",
 ) -> Answer:
     """Return an allocation in which every force is zero or at least `least` [N].
 
-    Forces inside the dead band are rounded to its nearer end and fixed, largest first, and the rest
-    allocated again until none is left inside. `duality_gap` bounds the cost above the optimum of the
-    problem *without* the dead band: what the dead band costs at most. The status is OPTIMAL only where
-    that is next to nothing.
+    Forces inside the dead band are rounded to the nearer end that the sample's bounds allow and fixed,
+    largest first, and the rest allocated again until none is left inside. `duality_gap` bounds the cost
+    above the optimum of the problem *without* the dead band: what the dead band costs at most. The
+    status is OPTIMAL only where that is next to nothing. A rate limit that allows neither end wins.
     """
     if not least >= 0 or np.any(problem.lower < 0):
         raise AllocationError("a minimum impulse needs least >= 0 and actuators that push one way (lower >= 0)")
     last = np.clip(np.zeros(problem.count), problem.lower, problem.upper) if previous is None else np.asarray(previous)
-    relaxed = solve(problem, command, last, backend=backend)
-    answer, fixed = relaxed, problem
+    allocator = Allocator(problem, backend, accuracy=accuracy)
+    relaxed = allocator.solve(command, last)
+    if relaxed.status in (AllocationStatus.BAD_COMMAND, AllocationStatus.FAILED):
+        return relaxed
+    low, high = problem.box(last)
+    lower, upper, answer = low.copy(), high.copy(), relaxed
     for _ in range(problem.count):
-        small = (answer.forces > 1e-9 * least) & (answer.forces < least * (1 - 1e-9)) & (fixed.lower < fixed.upper)
-        if not np.any(small):
+        inside = (answer.forces > 1e-9 * least) & (answer.forces < least * (1 - 1e-9)) & (lower < upper)
+        if not np.any(inside):
             break
-        i = int(np.argmax(np.where(small, answer.forces, -1.0)))
-        value = least if answer.forces[i] >= least / 2 and problem.upper[i] >= least else max(0.0, problem.lower[i])
-        lower, upper = fixed.lower.copy(), fixed.upper.copy()
+        i = int(np.argmax(np.where(inside, answer.forces, -1.0)))
+        ends = [end for end in (0.0, least) if low[i] <= end <= high[i]]
+        value = min(ends, key=lambda end: abs(end - answer.forces[i])) if ends else answer.forces[i]
         lower[i] = upper[i] = value
-        fixed = replace(fixed, lower=lower, upper=upper)
-        answer = solve(fixed, command, last, backend=backend)
-    forces = np.where(answer.forces < least / 2, np.maximum(0.0, problem.lower), answer.forces)
-    u = np.asarray(command, dtype=float)
+        answer = allocator.solve(command, last, (lower.copy(), upper.copy()))
+    forces, u = np.where(answer.forces <= 1e-9 * least, low, answer.forces), np.asarray(command, dtype=float)
     cost = problem.objective(forces, u, last)
     gap = cost - (relaxed.objective - relaxed.duality_gap)
-    certified = gap <= max(
-        ACCURACIES["mid"][0] * cost, ACCURACIES["mid"][1] * problem.accuracy_weight * problem.full_effort**2
-    )
     return replace(
         answer,
         forces=forces,
         objective=cost,
         duality_gap=gap,
+        vertex_weights=relaxed.vertex_weights,
+        worst_vertex=int(np.argmax(problem.vertex_costs(forces, u))),
         unallocated=u - problem.effectiveness @ forces,
-        status=AllocationStatus.OPTIMAL if certified else AllocationStatus.NOT_CERTIFIED,
+        saturation=saturation(problem, forces, (low, high)),
+        status=judge(problem, u, cost, gap, ACCURACIES[accuracy]),
     )

@@ -133,7 +133,8 @@ class OnlineSolver:
         """Return the answer of the C to one sample."""
         count, _, _, vertices = self._sizes
         forces, weights, numbers = np.zeros(count), np.zeros(vertices), np.zeros(6)
-        inputs = [np.ascontiguousarray(column, dtype=float) for column in (command, previous, lower, upper)]
+        rows = self._sizes[1]
+        inputs = [_shaped(command, (rows,)), *(_shaped(column, (count,)) for column in (previous, lower, upper))]
         self._c.allocator_solve(
             _pointer(self._work),
             _pointer(self._data),
@@ -154,7 +155,8 @@ class OnlineSolver:
         The numbers (K, 6) are objective, gap, worst vertex, iterations, path (1 active set, 2 interior
         point) and status of each.
         """
-        inputs = [np.ascontiguousarray(column, dtype=float) for column in (commands, lower, upper)]
+        count, rows, _, _ = self._sizes
+        inputs = [_shaped(commands, (len(commands), rows)), _shaped(lower, (count,)), _shaped(upper, (count,))]
         forces, numbers = np.zeros((len(commands), self._sizes[0])), np.zeros((len(commands), 6))
         self._c.allocator_sequence(
             _pointer(self._work),
@@ -167,6 +169,14 @@ class OnlineSolver:
             _pointer(numbers),
         )
         return forces, numbers
+
+
+def _shaped(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return an array that C may read; raise `AllocationError` where it would read past the end."""
+    column = np.ascontiguousarray(array, dtype=float)
+    if column.shape != shape:
+        raise AllocationError(f"an array has shape {column.shape}, expected {shape}")
+    return column
 
 
 def _aligned(size: int) -> np.ndarray:

@@ -72,8 +72,9 @@ class WheelSet:
         # A wheel beyond its limit may only slow down; the amplitude box wins where both clash.
         lower = np.clip((-self.max_speed - speed) / period, problem.lower, problem.upper)
         upper = np.clip((self.max_speed - speed) / period, problem.lower, problem.upper)
-        free = null_space(problem.effectiveness)
-        wanted = -desaturation * free @ (free.T @ speed)
+        turning = problem.lower < problem.upper  # dead and stuck wheels take no part
+        free, wanted = null_space(problem.effectiveness[:, turning]), np.zeros(problem.count)
+        wanted[turning] = -desaturation * free @ (free.T @ speed[turning])
         return replace(problem, lower=lower, upper=upper, preferred=wanted)
 
 

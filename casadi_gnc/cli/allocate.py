@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from enum import Enum
 from pathlib import Path
@@ -52,7 +53,6 @@ def allocate(
 
 def _table(allocator: CaseAllocator, commands: Path, out: Path | None, tally: Tally) -> None:
     import csv
-    import io
 
     from casadi_gnc.files import prepare_folder, write_beside
     from casadi_gnc.missions import allocating
@@ -81,13 +81,17 @@ def _stream(allocator: CaseAllocator, tally: Tally, *, json: bool) -> None:
     rows = len(allocator.case.row_scale)
     names = ",".join(f"u{i}" for i in range(1, rows + 1))
 
+    for stream in (sys.stdin, sys.stdout):  # a byte that is no text must not end the stream
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+
     def say(line: str) -> None:
         sys.stdout.write(line + "\n")
         sys.stdout.flush()
 
     try:
         for number, line in enumerate(sys.stdin, 1):
-            if not line.strip() or (number == 1 and line.strip() == names):
+            if not line.strip() or (number == 1 and line.strip().lstrip("\ufeff") == names):
                 continue
             try:
                 command = allocating.parse_line(line, rows)

@@ -27,7 +27,7 @@ def attainable(
     case = load_allocation(problem)
     if plot is not None:
         prepare_folder(plot.parent)
-    found = analyse(case.problem, case.torque_limit, samples=samples, seed=seed)
+    found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed)
     if json:
         import json as encoder
 
@@ -42,5 +42,5 @@ def attainable(
     if plot is not None:
         from casadi_gnc.allocation.attainable_plots import plot_slices
 
-        plot_slices(case.problem, plot, wanted=case.torque_limit)
+        plot_slices(case.physical, plot, wanted=case.torque_limit)
         typer.echo(f"wrote {plot}", err=json)

@@ -7,7 +7,7 @@ import sys
 
 import typer
 
-from casadi_gnc.cli import allocate, attainable, doctor, fly, problems, schema
+from casadi_gnc.cli import allocate, attainable, doctor, fly, problems, schema, synthesize
 from casadi_gnc.errors import GncError
 
 app = typer.Typer(
@@ -21,6 +21,7 @@ app = typer.Typer(
 app.command("fly")(fly.fly)
 app.command("allocate")(allocate.allocate)
 app.command("attainable")(attainable.attainable)
+app.command("synthesize")(synthesize.synthesize)
 app.add_typer(problems.app, name="problems")
 app.command("schema")(schema.schema)
 app.command("doctor")(doctor.doctor)

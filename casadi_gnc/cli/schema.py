@@ -14,8 +14,9 @@ def schema() -> None:
 
     from casadi_gnc.missions import crafts
     from casadi_gnc.missions.allocation_file import AllocationModel
+    from casadi_gnc.missions.synthesis_file import SynthesisModel
 
-    files: Any = AllocationModel
+    files: Any = AllocationModel | SynthesisModel
     for name in crafts.names():
         files = files | crafts.module(name).MissionFile
     described = TypeAdapter(files).json_schema()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc.allocation import Allocator, Answer
+from casadi_gnc.allocation import AllocationStatus, Allocator, Answer
 from casadi_gnc.allocation.allocator import Accuracy
 from casadi_gnc.allocation.modes import along_direction, with_minimum_impulse
 from casadi_gnc.errors import ProblemError
@@ -23,21 +24,29 @@ class CaseAllocator:
 
     def __init__(self, case: AllocationCase, backend: str, accuracy: Accuracy = "mid") -> None:
         self.case = case
+        self._accuracy: Accuracy = accuracy
         self._allocator = Allocator(case.problem, backend, accuracy=accuracy)
 
     def solve(self, command: np.ndarray) -> Answer:
         """Return the answer to a command (R,) in its own unit; unallocated effort is in that unit too."""
         case, scaled = self.case, np.asarray(command, dtype=float) * self.case.row_scale
-        if case.least_force is not None and np.all(np.isfinite(scaled)):
+        started = time.perf_counter()
+        if case.least_force is not None:
             answer = with_minimum_impulse(
-                case.problem, scaled, case.least_force, self._allocator.previous, backend=self._allocator.backend
+                case.problem,
+                scaled,
+                case.least_force,
+                self._allocator.previous,
+                backend=self._allocator.backend,
+                accuracy=self._accuracy,
             )
-            self._allocator.previous = answer.forces
+            self._allocator.previous = answer.forces.copy()
         elif case.keep_direction:
             answer, _ = along_direction(self._allocator, scaled)
         else:
             answer = self._allocator.solve(scaled)
-        return replace(answer, unallocated=answer.unallocated / case.row_scale)
+        seconds = time.perf_counter() - started  # all of it, certificate and linear programs included
+        return replace(answer, unallocated=answer.unallocated / case.row_scale, seconds=seconds)
 
 
 def read_commands(path: Path, rows: int) -> np.ndarray:
@@ -51,7 +60,7 @@ def read_commands(path: Path, rows: int) -> np.ndarray:
     """
     names = [f"u{i}" for i in range(1, rows + 1)]
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
             lacking = [name for name in names if name not in (reader.fieldnames or [])]
             if lacking:
@@ -60,7 +69,7 @@ def read_commands(path: Path, rows: int) -> np.ndarray:
                     f"column {lacking[0]} is missing in the first line; expected {', '.join(names)}, found {found}",
                     path.name,
                 )
-            commands = [[_number(row[name], path, k, name) for name in names] for k, row in enumerate(reader, 2)]
+            commands = [[_number(row[name], path, reader.line_num, name) for name in names] for row in reader]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ProblemError(f"cannot be read as CSV: {error}", str(path)) from error
     if not commands:
@@ -139,7 +148,8 @@ class Tally:
         """Count one answer."""
         self.seconds.append(answer.seconds)
         self.statuses[answer.status.name] = self.statuses.get(answer.status.name, 0) + 1
-        self.worst_gap = max(self.worst_gap or 0.0, answer.relative_gap)
+        if answer.status is not AllocationStatus.BAD_COMMAND:
+            self.worst_gap = max(self.worst_gap or 0.0, answer.relative_gap)
 
     def summary(self) -> dict[str, Any]:
         """Return counts, the largest relative gap of all answers, and latency percentiles."""

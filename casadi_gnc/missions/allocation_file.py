@@ -105,6 +105,12 @@ class Options(Part):
         default=None, description="minimum impulse: forces are zero or at least this"
     )
 
+    @model_validator(mode="after")
+    def _one_treatment(self) -> Options:
+        if self.keep_direction and self.least_force_N is not None:
+            raise ValueError("keep_direction and least_force_N cannot be combined; leave one out")
+        return self
+
 
 class AllocationModel(Part):
     """An allocation file."""
@@ -138,6 +144,8 @@ class AllocationCase:
     Parameters
     ----------
     problem : for `casadi_gnc.allocation`; rows scaled by `row_scale` where priorities are given.
+    physical : the same without that scaling, in the effort's own unit.
+    has_wheels : whether there are wheels, whose speeds a table of commands does not follow.
     row_scale : (R,), factor to put on a command before it is allocated.
     torque_limit : box that a law may ask for, (R,), or None.
     keep_direction, least_force : see the file's options.
@@ -146,6 +154,8 @@ class AllocationCase:
     name: str
     title: str
     problem: AllocationProblem
+    physical: AllocationProblem
+    has_wheels: bool
     row_scale: np.ndarray
     torque_limit: np.ndarray | None
     keep_direction: bool
@@ -154,12 +164,15 @@ class AllocationCase:
     @property
     def warnings(self) -> list[str]:
         """Sentences on what a user should know before trusting the answers."""
-        strength = np.linalg.svd(self.problem.effectiveness, compute_uv=False)
+        told = []
+        if self.has_wheels:
+            told.append("wheel speeds stay as given: their limits and desaturation hold for one sample, not along rows")
+        strength = np.linalg.svd(self.physical.effectiveness, compute_uv=False)
         rank = int(np.sum(strength > 1e-9 * max(strength[0], 1e-300)))
         rows = len(self.problem.effectiveness)
         if rank < rows:
-            return [f"the effectiveness has rank {rank} of {rows}: some effort cannot be made by any actuator"]
-        return []
+            told.append(f"the effectiveness has rank {rank} of {rows}: some effort cannot be made by any actuator")
+        return told
 
 
 def load_allocation(problem: str | Path) -> AllocationCase:
@@ -216,14 +229,24 @@ def _build(model: AllocationModel, name: str) -> AllocationCase:
         degraded={fault.actuator: (fault.low, fault.high) for fault in faults.degraded},
     )
     rows = len(problem.effectiveness)
-    scale, options = np.ones(rows), model.options
+    scale, options, physical = np.ones(rows), model.options, problem
     if options.priorities is not None:
         problem = by_priority(problem, options.priorities, options.priority_ratio)
         scale = axis_scale(options.priorities, options.priority_ratio)
     limit = None if model.torque_limit_N_m is None else np.array(model.torque_limit_N_m)
     if limit is not None and len(limit) != rows:
         raise AllocationError(f"torque_limit_N_m has {len(limit)} entries, expected {rows}")
-    return AllocationCase(name, model.title, problem, scale, limit, options.keep_direction, options.least_force_N)
+    return AllocationCase(
+        name,
+        model.title,
+        problem,
+        physical,
+        model.wheels is not None,
+        scale,
+        limit,
+        options.keep_direction,
+        options.least_force_N,
+    )
 
 
 def _thrusters(model: MountedThrusters, period: float, accuracy: float) -> AllocationProblem:

@@ -124,9 +124,9 @@ def explain(error: ValidationError, path: Path, text: str, data: dict[str, Any],
         told: Any = first.get("ctx", {})
         kinds = told["expected_tags"].replace("'", "").split(", ")
         near = difflib.get_close_matches(str(told["tag"]), kinds, 1)
-        message = f"unknown {told['discriminator']} {told['tag']!r}".replace("''", "'") + (
-            f"; did you mean {near[0]}?" if near else f"; known: {', '.join(kinds)}"
-        )
+        kind = told["discriminator"].strip("'")
+        message = f"unknown {kind} {told['tag']!r}"
+        message += f"; did you mean {near[0]}?" if near else f"; known: {', '.join(kinds)}"
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     return ProblemError(message + more, toml_place.describe(path, text, tuple(key)))
 

@@ -165,8 +165,9 @@ typedef struct {
 /* The answer. */
 typedef struct {
     GNC_ALLOC_NAME(real) force[GNC_ALLOC_N];        /* lo <= F <= hi, always */
-    GNC_ALLOC_NAME(real) objective;                 /* f(F) */
-    GNC_ALLOC_NAME(real) gap;                       /* f(F) - min f <= gap, rigorous */
+    /* f(F), and f(F) - min f <= gap, rigorous; with the M1 that is added where M1 = M2 = 0 */
+    GNC_ALLOC_NAME(real) objective;
+    GNC_ALLOC_NAME(real) gap;
     GNC_ALLOC_NAME(real) relative_gap;              /* gap / f(F); 0 when both are 0 */
     GNC_ALLOC_NAME(real) lambda[GNC_ALLOC_V];       /* weight of each vertex; sums to 1 */
     GNC_ALLOC_NAME(real) unallocated[GNC_ALLOC_R];  /* u - A0 F, N m */

@@ -116,3 +116,24 @@ def test_update_keeps_the_warm_start_of_the_on_board_solver(rng):
     assert all(answer.status.is_certified for answer in answers)
     assert answers[0].iterations < answers[1].iterations
     assert answers[0].objective == pytest.approx(answers[1].objective, rel=1e-7)
+
+
+def test_dead_actuators_of_the_truth_do_not_follow():
+    from casadi_gnc.missions.allocation_file import load_allocation
+
+    problem = load_allocation("huang2020/allocation").problem
+    assert worst_alignment(problem).share > 0.9
+    assert worst_alignment(problem, with_faults(problem, dead=tuple(range(1, 13)))).share == pytest.approx(0.0)
+
+
+def test_arrays_that_the_c_would_read_past_are_refused():
+    from casadi_gnc.allocation.online import OnlineSolver
+    from casadi_gnc.missions.allocation_file import load_allocation
+
+    solver = OnlineSolver(load_allocation("huang2020/allocation").problem)
+    lower, upper = np.zeros(12), np.full(12, 1e-3)
+    with pytest.raises(AllocationError, match=r"expected \(3,\)"):
+        solver.solve(np.zeros(1), lower, lower, upper)
+    for commands, low in ((np.zeros((5, 2)), lower), (np.zeros(3), lower), (np.zeros((5, 3)), 0.0)):
+        with pytest.raises(AllocationError, match="an array has shape"):
+            solver.sequence(commands, low, upper)

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from casadi_gnc.allocation import AllocationProblem, Allocator, solve
+from casadi_gnc.allocation import AllocationProblem, AllocationStatus, Allocator, Saturation, solve
 from casadi_gnc.allocation.modes import along_direction, axis_scale, by_priority, largest_scale, with_minimum_impulse
 from casadi_gnc.errors import AllocationError
 from casadi_gnc.missions.allocation_file import load_allocation
@@ -74,3 +74,36 @@ def test_dead_band_is_respected_and_its_cost_bounded(rng):
 def test_dead_band_needs_one_way_actuators():
     with pytest.raises(AllocationError, match="push one way"):
         with_minimum_impulse(AllocationProblem(np.eye(2), -1.0, 1.0), np.ones(2), 0.1)
+
+
+@pytest.mark.parametrize("command", [1e120, 1e160, np.nan, np.inf])
+def test_incredible_commands_stay_bad_in_every_mode(thrusters, command):
+    u = np.array([command, 0.0, 0.0])
+    rounded = with_minimum_impulse(thrusters, u, 1e-4)
+    kept, share = along_direction(Allocator(thrusters), u)
+    assert rounded.status is kept.status is AllocationStatus.BAD_COMMAND
+    assert share == 0.0
+    assert np.all(np.isfinite(rounded.forces))
+
+
+def test_dead_band_keeps_rate_limits_and_says_what_saturates():
+    problem = AllocationProblem(np.eye(2), 0.0, 1.0, max_step=0.3, accuracy_weight=100.0)
+    answer = with_minimum_impulse(problem, np.array([0.2, 0.9]), 0.25, np.zeros(2))
+    assert np.all(answer.forces <= 0.3)
+    assert answer.forces[0] in (0.0, 0.25)
+    assert answer.saturation[1] == Saturation.UPPER_RATE
+    assert Saturation.STUCK not in answer.saturation
+
+
+def test_boxes_are_checked(thrusters):
+    allocator = Allocator(thrusters)
+    wrong = [(np.full(12, 2e-3), np.full(12, 1e-3)), (np.full(12, np.nan), np.ones(12)), (np.zeros(1), np.ones(1))]
+    for box in wrong:
+        with pytest.raises(AllocationError, match="box has"):
+            allocator.solve(np.zeros(3), np.zeros(12), box)
+
+
+def test_an_infinite_cost_proves_nothing():
+    problem = AllocationProblem(np.eye(2), 0.0, 1.0, change_weight=1e150)
+    answer = Allocator(problem, "pinv").solve(np.ones(2), np.full(2, 1e90))
+    assert answer.status is AllocationStatus.NOT_CERTIFIED

@@ -201,3 +201,31 @@ def test_rank_deficient_effectiveness_is_warned_of_and_solved(tmp_path):
     done = run(str(path), "--stream", "--json", given="0.3 0.6\n")
     assert "warning: the effectiveness has rank 1 of 2" in done.stderr
     assert json.loads(done.stdout)["status"] == "OPTIMAL"
+
+
+def test_bytes_that_are_no_text_do_not_end_the_stream():
+    done = subprocess.run(
+        [*PROGRAM, CASE, "--stream"], input=b"1e-4 0 0\n\xff\xfe 0 0\n1e-4 0 0\n", capture_output=True, timeout=120
+    )
+    lines = done.stdout.decode().splitlines()
+    assert done.returncode == 0, done.stderr
+    assert [line.startswith("error") for line in lines] == [False, True, False]
+
+
+def test_table_with_byte_order_mark_and_blank_lines(tmp_path):
+    path = tmp_path / "excel.csv"
+    path.write_bytes(b"\xef\xbb\xbfu1,u2,u3\r\n1e-4,0,0\r\n\r\n\r\n0,x,0\r\n")
+    told(run(CASE, "--commands", str(path)), "excel.csv, line 5, column u2: 'x' is no number")
+
+
+def test_priorities_do_not_change_what_can_be_attained(tmp_path):
+    from casadi_gnc.missions.loading import read
+
+    _, text, _ = read(CASE)
+    path = tmp_path / "priorities.toml"
+    path.write_text(text.replace("[weights]", "[options]\npriorities = [0, 1, 1]\n[weights]"))
+    shares = []
+    for problem in (CASE, str(path)):
+        command = [*PROGRAM[:-1], "attainable", problem, "--json", "--samples", "0"]
+        shares.append(json.loads(subprocess.run(command, capture_output=True, text=True).stdout)["share_of_wanted"])
+    assert shares[0] == shares[1]

@@ -9,6 +9,7 @@ from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions import toml_place
 from casadi_gnc.missions.allocation_file import load_allocation
 from casadi_gnc.missions.loading import read, shipped
+from casadi_gnc.missions.synthesis_file import load_synthesis
 
 _, GOOD, _ = read("huang2020/detumble")
 _, SLEW, _ = read("huang2020/slew")
@@ -36,7 +37,7 @@ CASES = {
     "broken samples": (GOOD, "sample_period_s = 0.1", "sample_period_s = 0.7", "expected a whole number"),
     "wrong kind": (GOOD, 'kind = "mission"', 'kind = "voyage"', "kind is 'voyage'; only a file of kind \"mission\""),
     "no toml": (GOOD, "[truth]", "[truth", "is not valid TOML"),
-    "unknown law": (GOOD, 'type = "rate_damping"', 'type = "magic"', "scheme.1..law.*rate_damping"),
+    "unknown law": (GOOD, 'type = "rate_damping"', 'type = "magic"', r"scheme\[1\].law: unknown type 'magic'; known: rate_damping"),
     "negative gain": (GOOD, "rate_gain = 0.4 }", "rate_gain = -0.4 }", r"scheme\[1\].law.rate_gain: .*greater than 0, got -0.4"),
     "unknown erratum": (GOOD, 'feedback = "wanted"', 'feedback = "wanted"\nas_printed = ["typo"]', "detumble has no erratum 'typo'; known: anti_windup_sign"),
     "unknown signal": (GOOD, 'signal = "force"', 'signal = "forces"', r"metric\[4\].signal: 'forces' is no signal of scheme damping_pinv; there is time, mrp"),
@@ -99,8 +100,9 @@ def test_binary_file_is_told(tmp_path):
 
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_problems_load(name):
-    if read(name)[2]["kind"] == "allocation":
-        assert load_allocation(name).title
+    others = {"allocation": load_allocation, "synthesis": load_synthesis}
+    if (kind := read(name)[2]["kind"]) in others:
+        assert others[kind](name).title
         return
     mission = casadi_gnc.load(name)
     assert mission.title

@@ -1,0 +1,48 @@
+"""`casadi-gnc synthesize`: gains from linear matrix inequalities, certified from the data."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+
+def synthesize(
+    problem: Annotated[str, typer.Argument(help="A synthesis file, or the name of a shipped one.")],
+    backend: Annotated[str | None, typer.Option(help="clarabel, scs or barrier, instead of the file's.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Find gains by a recipe and certify them; exit code 1 where there are none that can be used."""
+    from casadi_gnc.errors import SynthesisError
+    from casadi_gnc.missions.synthesis_file import load_synthesis, synthesize
+
+    if backend not in (None, "clarabel", "scs", "barrier"):
+        raise SynthesisError(f"no synthesis back end {backend!r}; there is clarabel, scs, barrier")
+    case = load_synthesis(problem)
+    found = synthesize(case, backend)
+    if json:
+        import json as encoder
+
+        typer.echo(encoder.dumps(found, indent=2))
+    else:
+        _print(case.title or case.name, found)
+    if not found["certified"]:
+        raise typer.Exit(1)
+
+
+def _print(title: str, found: dict[str, Any]) -> None:
+    typer.echo(title)
+    typer.echo(f"{found['status']}: {found['sentence']}")
+    for name, gain in found["gains"].items():
+        typer.echo(f"{name} =")
+        for row in gain:
+            typer.echo("  [" + ", ".join(f"{value:.6g}" for value in row) + "]")
+    if found.get("norm"):
+        typer.echo(f"H-infinity norm: certified {found['promised_norm']:.4g}, true {found['norm']['upper']:.4g}")
+    if found.get("peak"):
+        typer.echo(f"peak command: {found['peak']['bound']:.4g} of {found['peak']['limit']:.4g}")
+    if found.get("poles_rad_s"):
+        slowest = max(pole[0] for pole in found["poles_rad_s"])
+        typer.echo(f"slowest pole: {slowest:.4g} rad/s")
+    for one in found["constraints"]:
+        typer.echo(f"  {one['name']}: smallest eigenvalue {one['smallest']:.3g}, asked for {one['margin']:.3g}")

@@ -1,0 +1,159 @@
+"""What a set of LMIs returns: unknowns in original units, and our own word on them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from casadi_gnc.errors import SynthesisError
+from casadi_gnc.synthesis.backends import Claim, Found
+from casadi_gnc.synthesis.certificate import (
+    Check,
+    Infeasibility,
+    Ray,
+    bound,
+    check,
+    onto_equalities,
+    prove_infeasible,
+    prove_unbounded,
+)
+from casadi_gnc.synthesis.scaling import Scaled
+
+_GAP = 1e-4  # of the objective's terms: what counts as optimal; SCS reaches about 1e-6
+
+_LARGEST = 1e100  # scaled unknowns beyond are no numbers
+
+
+class LmiStatus(Enum):
+    """How a set of LMIs ended; the value is the sentence for the reader."""
+
+    CERTIFIED = "Every constraint holds, by eigenvalues computed from the data, and the objective is optimal."
+    FEASIBLE = (
+        "Every constraint holds, by eigenvalues computed from the data, but the objective may be improved: see gap."
+    )
+    NOT_CERTIFIED = "The solver's answer does not keep the constraints; enlarge the margins or take another back end."
+    INFEASIBLE = "No unknowns meet all constraints, proved by multipliers; relax one of those in conflict."
+    UNBOUNDED = "The objective falls without end along a ray; bound the unknowns that run away."
+    UNDECIDED = "The solver returned neither a point nor a proof; change units, margins or the back end."
+
+    @property
+    def holds(self) -> bool:
+        """Whether every constraint is certified."""
+        return self in (LmiStatus.CERTIFIED, LmiStatus.FEASIBLE)
+
+
+@dataclass(frozen=True, eq=False)
+class LmiAnswer:
+    """Hold the answer to a set of LMIs.
+
+    Parameters
+    ----------
+    status : how it ended, by our certificate.
+    point : (N,), scalar unknowns in original units; NaN if there are none.
+    unknowns : matrices by name.
+    objective : at the point; NaN without one.
+    gap : objective less a lower bound from the multipliers, in its unit; infinite without a bound.
+    checks : of every constraint at the point.
+    infeasibility, ray : proofs that there is no point, or no minimum; else None.
+    conflict : names of constraints that cannot be met together although any others of them can;
+        empty if not sought.
+    backend, iterations, seconds, claim : the solver's name and what it said.
+    """
+
+    status: LmiStatus
+    point: np.ndarray
+    unknowns: dict[str, np.ndarray]
+    objective: float
+    gap: float
+    checks: tuple[Check, ...]
+    infeasibility: Infeasibility | None
+    ray: Ray | None
+    backend: str
+    iterations: int
+    seconds: float
+    claim: Claim
+    conflict: tuple[str, ...] = field(default=())
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return an unknown; raise `SynthesisError` if it is not certified, or not there."""
+        if not self.status.holds:
+            raise SynthesisError(self.sentence())
+        if name not in self.unknowns:
+            raise SynthesisError(f"no unknown {name!r}; there is {', '.join(self.unknowns)}")
+        return self.unknowns[name]
+
+    @property
+    def worst(self) -> Check | None:
+        """Return the constraint that keeps least of its margin; None without a point."""
+        return max(self.checks, key=lambda one: one.lacking, default=None)
+
+    def sentence(self) -> str:
+        """Return what happened, where, and what to do."""
+        said, worst = self.status.value, self.worst
+        if self.status is LmiStatus.NOT_CERTIFIED and worst is not None:
+            return (
+                f"{said} The worst is {worst.name!r}: smallest eigenvalue or element {worst.smallest:.3g} "
+                f"where {worst.margin:.3g} was asked for (rounding {worst.allowance:.1g})."
+            )
+        if self.infeasibility is not None:
+            carried = [f"{name!r} {share:.0%}" for name, share in self.infeasibility.shares.items() if share > 0.01]
+            said += f" The multipliers lie on {', '.join(carried)}."
+            if self.conflict:
+                together = " and ".join(repr(name) for name in self.conflict)
+                verb = "cannot be met together" if len(self.conflict) > 1 else "cannot be met by itself"
+                said += f" {together} {verb}: relax {'one of them' if len(self.conflict) > 1 else 'it'}."
+        if self.ray is not None:
+            names = sorted({label.split("[")[0] for label in self.ray.direction})
+            said += f" Those are entries of {', '.join(names)}: add a constraint that bounds them."
+        return said
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """Hold what we make of what a solver found; fields as in `LmiAnswer`."""
+
+    status: LmiStatus
+    point: np.ndarray
+    checks: tuple[Check, ...] = ()
+    objective: float = float("nan")
+    gap: float = float("inf")
+    infeasibility: Infeasibility | None = None
+    ray: Ray | None = None
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """Order verdicts: proofs before points that hold before others; the smaller gap first."""
+        if self.status in (LmiStatus.INFEASIBLE, LmiStatus.UNBOUNDED, LmiStatus.CERTIFIED):
+            return 3, 0.0
+        return (2 if self.status is LmiStatus.FEASIBLE else int(self.status is LmiStatus.NOT_CERTIFIED)), -self.gap
+
+
+def judge(scaled: Scaled, found: Found) -> Verdict:
+    """Return what a solver's answer is worth; its claim only says which proof to try first."""
+    data, nothing = scaled.data, np.full(len(scaled.cost), np.nan)
+    if found.claim is Claim.UNBOUNDED:
+        ray = prove_unbounded(scaled, found.point)
+        if ray is not None:
+            return Verdict(LmiStatus.UNBOUNDED, nothing, ray=ray)
+    if found.claim is Claim.INFEASIBLE:
+        proof = prove_infeasible(scaled, found.dual)
+        status = LmiStatus.UNDECIDED if proof is None else LmiStatus.INFEASIBLE
+        return Verdict(status, nothing, infeasibility=proof)
+    if np.shape(found.point) != np.shape(scaled.cost) or not np.all(np.abs(found.point) <= _LARGEST):
+        return Verdict(LmiStatus.UNDECIDED, nothing)
+    y = onto_equalities(scaled, found.point)
+    point = scaled.original(y)
+    checks = check(data, point)
+    if not all(one.holds for one in checks):
+        proof = prove_infeasible(scaled, found.dual)
+        if proof is not None:
+            return Verdict(LmiStatus.INFEASIBLE, nothing, infeasibility=proof)
+        status = LmiStatus.NOT_CERTIFIED if found.claim is Claim.SOLVED else LmiStatus.UNDECIDED
+        return Verdict(status, point, checks)
+    objective = float(data.cost @ point) + data.constant
+    gap = objective - bound(scaled, found.dual, y) if np.any(data.cost) else 0.0
+    size = float(np.abs(data.cost) @ np.abs(point)) + abs(data.constant)
+    status = LmiStatus.CERTIFIED if gap <= _GAP * size else LmiStatus.FEASIBLE
+    return Verdict(status, point, checks, objective, gap)

@@ -1,0 +1,82 @@
+"""Back ends for LMIs: one file each, found by name, imported when first used.
+
+A back end is a module with
+
+* `REQUIRES`: the packages it needs, by the names they are imported under;
+* `solve(scaled, **options) -> Found`: an attempt at scaled conic data.
+
+`Found` is what the solver says; nothing of it is believed: `casadi_gnc.synthesis.certificate`
+recomputes everything from the data in original units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from importlib import import_module, util
+from typing import Any, Protocol
+
+import numpy as np
+
+from casadi_gnc.errors import SynthesisError
+from casadi_gnc.synthesis.scaling import Scaled
+
+
+class Claim(Enum):
+    """What a solver says of a problem."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    UNBOUNDED = "unbounded"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Hold what a solver returned, in scaled units.
+
+    Parameters
+    ----------
+    point : (N,), unknowns, or the ray if it claims an unbounded objective; may be NaN.
+    dual : (M,), multipliers in the dual cone, triangles with weights; may be NaN.
+    claim : what it says.
+    iterations : its count.
+    seconds : its own time; NaN if it does not say.
+    """
+
+    point: np.ndarray
+    dual: np.ndarray
+    claim: Claim
+    iterations: int = 0
+    seconds: float = float("nan")
+
+
+class BackEnd(Protocol):
+    """A module that attempts scaled conic data."""
+
+    REQUIRES: tuple[str, ...]
+
+    def solve(self, scaled: Scaled, **options: Any) -> Found:
+        """Return what the solver says."""
+        ...
+
+
+_HOMES = {"clarabel": "clarabel_", "scs": "scs_", "barrier": "barrier_"}
+
+
+def names() -> list[str]:
+    """Return the names of all back ends, installed or not."""
+    return list(_HOMES)
+
+
+def module(name: str) -> Any:
+    """Return a back end; raise `SynthesisError` naming what there is, or what is not installed."""
+    if name not in _HOMES:
+        raise SynthesisError(f"no LMI back end {name!r}; there is {', '.join(names())}")
+    found = import_module(f"{__name__}.{_HOMES[name]}")
+    lacking = [package for package in found.REQUIRES if util.find_spec(package) is None]
+    if lacking:
+        raise SynthesisError(
+            f"back end {name!r} needs {', '.join(lacking)}, which is not installed; 'barrier' needs nothing"
+        )
+    return found

@@ -1,0 +1,134 @@
+"""What a recipe returns: gains, and the proof that they do what they promise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from casadi_gnc.errors import SynthesisError
+from casadi_gnc.synthesis.analysis import Norm, poles
+from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus
+from casadi_gnc.synthesis.peak import Peak
+
+#: Poles faster than this multiple of the plant's own rates: the gain runs to infinity.
+RUNAWAY = 1e4
+
+
+class GainStatus(Enum):
+    """How a synthesis ended; the value is the sentence for the reader."""
+
+    CERTIFIED = "The gains keep what they promise: inequalities, poles, norm and peak recomputed from the data."
+    INFEASIBLE = "No gains meet the inequalities."
+    UNBOUNDED = "The inequalities leave the objective without a bound."
+    RUNS_AWAY = "The optimum is not attained, the gain runs to infinity; give fastest_rad_s, or a price on the command."
+    NOT_CERTIFIED = "The solver's answer does not keep the inequalities; no gain is returned."
+    UNSTABLE = "The closed loop has a pole that is not in the left half plane."
+    NORM_EXCEEDED = "The closed loop's H-infinity norm is larger than the certified bound."
+    INPUT_EXCEEDED = "The simulated command is larger than its limit."
+    UNDECIDED = "The solver returned neither gains nor a proof; change units, margins or the back end."
+
+
+_OF_LMIS = {
+    LmiStatus.NOT_CERTIFIED: GainStatus.NOT_CERTIFIED,
+    LmiStatus.INFEASIBLE: GainStatus.INFEASIBLE,
+    LmiStatus.UNBOUNDED: GainStatus.UNBOUNDED,
+    LmiStatus.UNDECIDED: GainStatus.UNDECIDED,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Synthesis:
+    """Hold gains with their certificate.
+
+    Parameters
+    ----------
+    status : how it ended.
+    gains : by name; what failed certification is kept for inspection in `candidate` only.
+    candidate : as gains, whatever the status; empty if there are none.
+    lmis : answer to the inequalities that the gains come from, or that have none.
+    promised : bound on the H-infinity norm that the inequalities imply; NaN if they imply none.
+    norm : true norm of the closed loop; None if it was not asked.
+    poles : (n,), of the closed loop, [rad/s].
+    peak : of the command, with its limit in `limit`; None if it was not asked.
+    """
+
+    status: GainStatus
+    candidate: dict[str, np.ndarray]
+    lmis: LmiAnswer
+    promised: float = float("nan")
+    norm: Norm | None = None
+    poles: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=complex))
+    peak: Peak | None = None
+    limit: float = float("nan")
+
+    @property
+    def is_certified(self) -> bool:
+        """Whether the gains may be used."""
+        return self.status is GainStatus.CERTIFIED
+
+    @property
+    def gains(self) -> dict[str, np.ndarray]:
+        """Return the gains; raise `SynthesisError` with the reason if they are not certified."""
+        if not self.is_certified:
+            raise SynthesisError(self.sentence())
+        return self.candidate
+
+    def sentence(self) -> str:
+        """Return what happened and what to do."""
+        said = self.status.value
+        if self.status in _OF_LMIS.values():
+            return f"{said} {self.lmis.sentence()}"
+        if self.status is GainStatus.NORM_EXCEEDED and self.norm is not None:
+            where = f"at {self.norm.frequency_rad_s:.3g} rad/s"
+            return f"{said} It is {self.norm.upper:.4g} {where}, promised {self.promised:.4g}."
+        if self.status is GainStatus.UNSTABLE or self.status is GainStatus.RUNS_AWAY:
+            slowest, fastest = self.poles[0], self.poles[np.argmax(np.abs(self.poles))]
+            return f"{said} Slowest pole {slowest:.3g}, fastest {fastest:.3g} rad/s."
+        if self.status is GainStatus.INPUT_EXCEEDED and self.peak is not None:
+            return f"{said} It may reach {self.peak.bound:.4g} at {self.peak.time_s:.3g} s, limit {self.limit:.4g}."
+        return said
+
+
+def failed(lmis: LmiAnswer) -> Synthesis:
+    """Return the synthesis for inequalities without a certified answer."""
+    return Synthesis(_OF_LMIS[lmis.status], {}, lmis)
+
+
+def certify_gains(
+    candidate: dict[str, np.ndarray],
+    lmis: LmiAnswer,
+    loop: np.ndarray,
+    rate: float,
+    *,
+    promised: float = float("nan"),
+    norm: Norm | None = None,
+    peak: Peak | None = None,
+    limit: float = float("nan"),
+) -> Synthesis:
+    """Return the synthesis with the first failure as its status.
+
+    Parameters
+    ----------
+    loop : (n, n), the closed loop's matrix, built from the gains and the plant's data.
+    rate : the plant's own, [rad/s], against which a gain that runs away is measured.
+    """
+    if not lmis.status.holds:
+        return failed(lmis)
+    found = poles(loop) if np.all(np.isfinite(loop)) else np.array([np.nan + 0j])
+    status = GainStatus.CERTIFIED
+    if not np.all(np.isfinite(found)) or found[0].real >= 0:
+        status = GainStatus.UNSTABLE
+    elif np.max(np.abs(found)) > RUNAWAY * rate:
+        status = GainStatus.RUNS_AWAY
+    elif norm is not None and not norm.upper <= promised:
+        status = GainStatus.NORM_EXCEEDED
+    elif peak is not None and not peak.bound <= limit:
+        status = GainStatus.INPUT_EXCEEDED
+    return Synthesis(status, candidate, lmis, promised, norm, found, peak, limit)
+
+
+def plant_rate(A: np.ndarray, B: np.ndarray) -> float:
+    """Return the plant's own rate, [rad/s]: the larger of its matrices' norms."""
+    return float(max(np.linalg.norm(A, 2), np.linalg.norm(B, 2)))

@@ -1,0 +1,1 @@
+"""Recipes: from a plant to certified gains, one file each."""

@@ -1,0 +1,96 @@
+"""State feedback u = -K x that stays below a force limit from every start of a polytope.
+
+| paper | code | meaning |
+|---|---|---|
+| x' = A x + B u | `A`, `B` | plant |
+| X = P^-1 > 0, W = K X | `X`, `W` | unknowns; the ellipsoid is x'Px <= 1 |
+| a | `decay_1_s` | V falls at least as exp(-2 a t) |
+| s^2 | `share` | square of the part of the limit that is used |
+
+Every vertex v lies in the ellipsoid, the ellipsoid shrinks, and in it |u_i| <= s limit_i:
+
+    [1, v'; v, X] >= 0,   A X + X A' - B W - W'B' + 2 a X < 0,   [s^2 limit_i^2, W_i; W_i', X] >= 0
+
+with W all at once, and s^2 limit^2 I, for a limit on the Euclidean norm. s is minimised and s <= 1
+(S. Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, section 7.2.3). The
+vertices are used themselves; a bound on 1'P1 instead would be wrong (problem sheet of Shi 2020, erratum 3).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.errors import SynthesisError
+from casadi_gnc.synthesis.analysis import fits, matrices
+from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, plant_rate
+from casadi_gnc.synthesis.lmis import Lmis
+from casadi_gnc.synthesis.peak import peak_command
+from casadi_gnc.synthesis.unknowns import block_matrix
+
+
+def input_ellipsoid(
+    A: Any,
+    B: Any,
+    vertices: Any,
+    limit: float,
+    decay_1_s: float,
+    *,
+    per_channel: bool = False,
+    margin: float = 1e-7,
+    backend: Any = "clarabel",
+    **options: Any,
+) -> Synthesis:
+    """Return K, (m, n), for u = -K x that decays as asked and uses the smallest part of the limit.
+
+    Parameters
+    ----------
+    A : (n, n), [1/s]. B : (n, m). vertices : (V, n), of the starts; see `box_vertices`.
+    limit : of the norm of u, or of each channel; positive, in the unit of u.
+    decay_1_s : a, at least 0.
+    per_channel : whether the limit is one of each channel.
+    margin : of the inequalities, in their units.
+    backend, options : see `casadi_gnc.synthesis.backends`.
+
+    Returns
+    -------
+    Synthesis
+        With gain "K"; `peak` is the simulated command from the worst vertex, `limit` the limit and
+        `lmis["share"]` the square of the part of it that the ellipsoid needs.
+
+    Raises
+    ------
+    SynthesisError
+        For wrong shapes, or a limit or decay out of range.
+    """
+    A, B, vertices = matrices(A=A, B=B, vertices=vertices)
+    n, m = len(A), B.shape[1]
+    fits("A", A, n, n)
+    fits("B", B, n, m)
+    fits("vertices", vertices, len(vertices), n)
+    if not (np.isfinite(limit) and limit > 0 and np.isfinite(decay_1_s) and decay_1_s >= 0):
+        raise SynthesisError(
+            f"limit is {limit} and decay_1_s {decay_1_s}; expected a positive and a non-negative number"
+        )
+    lmis = Lmis()
+    X, W, share = lmis.symmetric("X", n), lmis.rectangular("W", m, n), lmis.scalar("share")
+    moved = A @ X - B @ W
+    for k, vertex in enumerate(vertices):
+        lmis.psd(block_matrix([[1, vertex[None]], [X]]), margin=margin, name=f"start {k} in the ellipsoid")
+    lmis.nsd(moved + moved.T + 2 * decay_1_s * X, margin=margin, name="decay")
+    if per_channel:
+        for i in range(m):
+            lmis.psd(block_matrix([[share * limit**2, W[i, :]], [X]]), margin=margin, name=f"limit of channel {i}")
+    else:
+        lmis.psd(block_matrix([[share * limit**2 * np.eye(m), W], [X]]), margin=margin, name="limit")
+    lmis.nonnegative(1 - share, margin=margin, name="share of the limit")
+    lmis.minimize(share)
+    answer = lmis.solve(backend, **options)
+    if not answer.status.holds:
+        return failed(answer)
+    K = np.linalg.solve(answer["X"], answer["W"].T).T
+    loop = A - B @ K
+    stable = np.max(np.linalg.eigvals(loop).real) < 0
+    peak = peak_command(loop, K, vertices, per_channel=per_channel) if stable else None
+    return certify_gains({"K": K}, answer, loop, plant_rate(A, B), peak=peak, limit=limit)

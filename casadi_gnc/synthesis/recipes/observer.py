@@ -1,0 +1,106 @@
+"""Observer with the smallest certified H-infinity norm from disturbance and noise to the error.
+
+| paper | code | meaning |
+|---|---|---|
+| x' = A x + E w | `A`, `E` | plant; known inputs drop out of the error |
+| y = C x + F w | `C`, `F` | measurement; w holds the noise too |
+| z = G e | `G` | what part of the error e = x - estimate is to stay small |
+| P > 0, H = P L | `P`, `H` | unknowns |
+
+The error obeys e' = (A - L C) e + (E - L F) w. V = e'Pe and a Schur complement give
+
+    [P A + A'P - H C - C'H',  P E - H F,  G';
+     *,                      -gamma I,    0;
+     *,                       *,         -gamma I]  < 0
+
+which is the dual of state feedback (S. Boyd et al., 1994, section 7.5; there for the plant).
+As there, gamma is held a little above its smallest value while the trace of P is maximised.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
+from casadi_gnc.synthesis.answer import LmiAnswer
+from casadi_gnc.synthesis.gains import Synthesis, certify_gains, plant_rate
+from casadi_gnc.synthesis.lmis import Lmis
+from casadi_gnc.synthesis.recipes.two_steps import two_steps
+from casadi_gnc.synthesis.unknowns import block_matrix
+
+
+def observer(
+    A: Any,
+    C: Any,
+    E: Any,
+    F: Any,
+    G: Any = None,
+    *,
+    gamma: float | None = None,
+    slack: float = 0.02,
+    margin: float = 1e-7,
+    fastest_rad_s: float | None = None,
+    backend: Any = "clarabel",
+    **options: Any,
+) -> Synthesis:
+    """Return L, (n, r), for estimate' = A estimate + known + L (y - C estimate).
+
+    Parameters
+    ----------
+    A : (n, n). C : (r, n). E : (n, q). F : (r, q). G : (p, n), identity by default.
+    gamma : bound on the norm; by default (1 + slack) times the smallest.
+    slack : see gamma; positive.
+    margin : of the inequalities, in their units.
+    fastest_rad_s : the error's poles are kept to the right of minus this. Needed where w does not
+        disturb all of y: else the gain may run to infinity.
+    backend, options : see `casadi_gnc.synthesis.backends`.
+
+    Returns
+    -------
+    Synthesis
+        With gain "L"; `promised` is gamma, `norm` the true one.
+
+    Raises
+    ------
+    SynthesisError
+        For wrong shapes.
+
+    Examples
+    --------
+    >>> found = observer([[0.0]], [[1.0]], [[1.0, 0.0]], [[0.0, 1.0]])
+    >>> found.status.name, round(found.promised, 3)
+    ('CERTIFIED', 1.02)
+    """
+    A, C, E, F = matrices(A=A, C=C, E=E, F=F)
+    n, r, q = len(A), len(C), E.shape[1]
+    (G,) = matrices(G=np.eye(n) if G is None else G)
+    for name, matrix, rows, columns in (
+        ("A", A, n, n),
+        ("C", C, r, n),
+        ("E", E, n, q),
+        ("F", F, r, q),
+        ("G", G, len(G), n),
+    ):
+        fits(name, matrix, rows, columns)
+
+    def pose(lmis: Lmis, gamma: Any) -> Any:
+        P, H = lmis.symmetric("P", n), lmis.rectangular("H", n, r)
+        moved = P @ A - H @ C
+        lmis.psd(P, margin=margin, name="Lyapunov matrix")
+        lmis.nsd(
+            block_matrix([[moved + moved.T, P @ E - H @ F, G.T], [-gamma * np.eye(q), 0], [-gamma * np.eye(len(G))]]),
+            margin=margin,
+            name="bounded real",
+        )
+        if fastest_rad_s is not None:
+            lmis.psd(moved + moved.T + 2 * fastest_rad_s * P, margin=0.1 * margin, name="fastest pole")
+        return P
+
+    def build(answer: LmiAnswer, promised: float) -> Synthesis:
+        L = np.linalg.solve(answer["P"], answer["H"])
+        norm = h_infinity_norm(A - L @ C, E - L @ F, G)
+        return certify_gains({"L": L}, answer, A - L @ C, plant_rate(A, C), promised=promised, norm=norm)
+
+    return two_steps(pose, build, gamma, slack, backend, options)

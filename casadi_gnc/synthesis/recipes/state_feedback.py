@@ -1,0 +1,110 @@
+"""State feedback u = -K x with the smallest certified H-infinity norm.
+
+| paper | code | meaning |
+|---|---|---|
+| x' = A x + B u + E w | `A`, `B`, `E` | plant and disturbance |
+| z = C x + D u + F w | `C`, `D`, `F` | what is to stay small |
+| X = P^-1 > 0, W = K X | `X`, `W` | unknowns |
+
+V = x'Px with gamma V' + z'z - gamma^2 w'w < 0 along the loop, gives, after a congruence with X and a
+Schur complement, the bounded-real inequality in X, W and gamma
+
+    [A X + X A' - B W - W'B',  E,         (C X - D W)';
+     *,                       -gamma I,   F';
+     *,                        *,        -gamma I]  < 0
+
+(S. Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, section 7.5.) At the
+smallest gamma the gain is seldom unique and often infinite. So gamma is then held a little above, and
+the trace of X maximised: where D'D > 0 and F = 0, P = gamma X^-1 is then the stabilising solution of the
+Riccati equation A'P + P A + C'C - (P B + C'D)(D'D)^-1 (B'P + D'C) + P E E'P / gamma^2 = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
+from casadi_gnc.synthesis.answer import LmiAnswer
+from casadi_gnc.synthesis.gains import Synthesis, certify_gains, plant_rate
+from casadi_gnc.synthesis.lmis import Lmis
+from casadi_gnc.synthesis.recipes.two_steps import two_steps
+from casadi_gnc.synthesis.unknowns import block_matrix
+
+
+def state_feedback(
+    A: Any,
+    B: Any,
+    E: Any,
+    C: Any,
+    D: Any,
+    F: Any = None,
+    *,
+    gamma: float | None = None,
+    slack: float = 0.02,
+    margin: float = 1e-7,
+    fastest_rad_s: float | None = None,
+    backend: Any = "clarabel",
+    **options: Any,
+) -> Synthesis:
+    """Return K, (m, n), for u = -K x with the smallest norm from w to z.
+
+    Parameters
+    ----------
+    A : (n, n). B : (n, m). E : (n, q). C : (p, n). D : (p, m). F : (p, q), zero by default.
+    gamma : bound on the norm; by default (1 + slack) times the smallest.
+    slack : see gamma; positive.
+    margin : of the inequalities, in their units.
+    fastest_rad_s : the closed loop's poles are kept to the right of minus this. Needed where z does
+        not hold all of u: else the gain may run to infinity.
+    backend, options : see `casadi_gnc.synthesis.backends`.
+
+    Returns
+    -------
+    Synthesis
+        With gain "K"; `promised` is gamma, `norm` the true one.
+
+    Raises
+    ------
+    SynthesisError
+        For wrong shapes.
+
+    Examples
+    --------
+    >>> found = state_feedback([[0.0]], [[1.0]], [[1.0]], [[1.0], [0.0]], [[0.0], [1.0]])
+    >>> found.status.name, round(found.promised, 3)
+    ('CERTIFIED', 1.02)
+    """
+    A, B, E, C, D = matrices(A=A, B=B, E=E, C=C, D=D)
+    n, m, q, p = len(A), B.shape[1], E.shape[1], len(C)
+    (F,) = matrices(F=np.zeros((p, q)) if F is None else F)
+    for name, matrix, rows, columns in (
+        ("A", A, n, n),
+        ("B", B, n, m),
+        ("E", E, n, q),
+        ("C", C, p, n),
+        ("D", D, p, m),
+        ("F", F, p, q),
+    ):
+        fits(name, matrix, rows, columns)
+
+    def pose(lmis: Lmis, gamma: Any) -> Any:
+        X, W = lmis.symmetric("X", n), lmis.rectangular("W", m, n)
+        moved = A @ X - B @ W
+        lmis.psd(X, margin=margin, name="Lyapunov matrix")
+        lmis.nsd(
+            block_matrix([[moved + moved.T, E, (C @ X - D @ W).T], [-gamma * np.eye(q), F.T], [-gamma * np.eye(p)]]),
+            margin=margin,
+            name="bounded real",
+        )
+        if fastest_rad_s is not None:
+            lmis.psd(moved + moved.T + 2 * fastest_rad_s * X, margin=0.1 * margin, name="fastest pole")
+        return X
+
+    def build(answer: LmiAnswer, promised: float) -> Synthesis:
+        K = np.linalg.solve(answer["X"], answer["W"].T).T
+        norm = h_infinity_norm(A - B @ K, E, C - D @ K, F)
+        return certify_gains({"K": K}, answer, A - B @ K, plant_rate(A, B), promised=promised, norm=norm)
+
+    return two_steps(pose, build, gamma, slack, backend, options)
