@@ -1,4 +1,4 @@
-"""Truth: the tables of Huang, Biggs, Duan (2020) with the sheet's three corrections.
+"""Truth: the tables of Huang, Biggs, Duan (2020) with three corrections (docs/errata.md).
 
 Printed to five decimals, so entries agree to 1e-5 (the paper rounds its intermediate results).
 """

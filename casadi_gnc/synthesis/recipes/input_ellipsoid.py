@@ -13,7 +13,7 @@ Every vertex v lies in the ellipsoid, the ellipsoid shrinks, and in it |u_i| <= 
 
 with W all at once, and s^2 limit^2 I, for a limit on the Euclidean norm. s is minimised and s <= 1
 (S. Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, section 7.2.3). The
-vertices are used themselves; a bound on 1'P1 instead would be wrong (problem sheet of Shi 2020, erratum 3).
+vertices are used themselves; a bound on 1'P1 instead would be wrong (an erratum of Shi et al. 2020).
 """
 
 from __future__ import annotations
