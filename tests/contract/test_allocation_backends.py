@@ -26,8 +26,6 @@ _spec.loader.exec_module(oracle)
 
 CASES = oracle.cases()
 NAMES = backends.names()
-#: Packages of the extra "solvers" that "dev" leaves out: skipped by name wherever they are missing.
-NOT_IN_DEV = {"piqp", "qpalm"}
 #: Without curvature of their own (M1 = M2 = 0) the gap has a part of first order in the forces: a
 #: solver's 1e-8 of the box is 1e-8 of the full effort's cost.
 DEGENERATE_FLOOR = 1e-7
@@ -37,7 +35,7 @@ def need(name: str) -> str:
     """Return the name of a back end that is installed; without it fail in CI and skip, by name, elsewhere."""
     lacking = backends.missing(name)
     if lacking:
-        if os.environ.get("CI") == "true" and not NOT_IN_DEV.intersection(lacking):
+        if os.environ.get("CI") == "true":
             pytest.fail(f"CI needs {', '.join(lacking)} for the back end {name}")
         pytest.skip(f"{', '.join(lacking)} is not installed, for the back end {name}")
     return name

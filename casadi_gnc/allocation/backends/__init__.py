@@ -95,7 +95,6 @@ _HOMES = {
     "osqp": "qpsolvers_:OSQP",
     "highs": "qpsolvers_:HIGHS",
     "piqp": "qpsolvers_:PIQP",
-    "qpalm": "qpsolvers_:QPALM",
     "pinv": "pinv_",
 }
 #: Before the name of any solver that qpsolvers finds, whatever its licence.

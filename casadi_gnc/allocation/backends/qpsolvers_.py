@@ -1,7 +1,7 @@
 """Allocation without uncertainty through any solver that the package qpsolvers finds.
 
-The program is that of `proxqp_`. Four solvers have names of their own: "osqp", "highs", "piqp" and
-"qpalm"; "qpsolvers:NAME" reaches every other one that is installed. Among these are solvers under the
+The program is that of `proxqp_`. Three solvers have names of their own: "osqp", "highs" and "piqp";
+"qpsolvers:NAME" reaches every other one that is installed. Among these are solvers under the
 GPL (quadprog, cvxopt, ecos, qpswift): they are never installed nor chosen by us, only named by a user.
 Slow, since the problem is handed over whole every sample: for comparison.
 """
@@ -120,4 +120,3 @@ def back_end(solver: str, *packages: str, accuracy: tuple[float, float] = (1e-6,
 OSQP = back_end("osqp", "osqp")
 HIGHS = back_end("highs", "highspy")
 PIQP = back_end("piqp", "piqp")
-QPALM = back_end("qpalm", "qpalm")
