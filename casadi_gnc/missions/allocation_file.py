@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults
@@ -22,7 +22,6 @@ from casadi_gnc.errors import AllocationError, ProblemError
 from casadi_gnc.missions import loading, matrices
 from casadi_gnc.missions.crafts.combined_spacecraft import Thrusters
 from casadi_gnc.missions.schema import Format, NonNegative, Orientation, Part, Positive, Rows, Vector, orientation
-from casadi_gnc.missions.toml_place import describe
 from casadi_gnc.thrusters import ThrusterGeometry
 
 Number = Annotated[int, Field(ge=1, description="actuators are numbered from 1, in the order of the columns")]
@@ -177,14 +176,8 @@ class AllocationCase:
 
 def load_allocation(problem: str | Path) -> AllocationCase:
     """Return the case of an allocation file, given by path or shipped name; raise `ProblemError`."""
-    path, text, data = loading.read(problem)
-    if data.get("kind") != "allocation":
-        place = describe(path, text, ("kind",))
-        raise ProblemError(f'kind is {data.get("kind")!r}; this command takes a file of kind "allocation"', place)
-    try:
-        model = AllocationModel.model_validate(data)
-    except ValidationError as error:
-        raise loading.explain(error, path, text, data, AllocationModel) from None
+    path, text, data = loading.read_kind(problem, "allocation")
+    model: AllocationModel = loading.validated(AllocationModel, data, path, text)
     try:
         return _build(model, path.stem)
     except AllocationError as error:

@@ -70,12 +70,25 @@ def load(problem: str | Path) -> Mission:
     >>> mission.timing.samples
     15001
     """
-    path, text, data = read(problem)
-    kind = data.get("kind")
-    if kind != "mission":
-        place = toml_place.describe(path, text, ("kind",))
-        raise ProblemError(f'kind is {kind!r}; only a file of kind "mission" can be flown', place)
+    path, text, data = read_kind(problem, "mission")
     return building.build(check(data, path, text), path, text)
+
+
+def read_kind(problem: str | Path, kind: str) -> tuple[Path, str, dict[str, Any]]:
+    """Return path, text and content of a problem file; raise `ProblemError` if it is of another kind."""
+    path, text, data = read(problem)
+    if data.get("kind") != kind:
+        place = toml_place.describe(path, text, ("kind",))
+        raise ProblemError(f'kind is {data.get("kind")!r}; this takes a file of kind "{kind}"', place)
+    return path, text, data
+
+
+def validated(file: Any, data: dict[str, Any], path: Path, text: str) -> Any:
+    """Return the data checked by a pydantic model; raise `ProblemError` with place and remedy."""
+    try:
+        return file.model_validate(data)
+    except ValidationError as error:
+        raise explain(error, path, text, data, file) from None
 
 
 def check(data: dict[str, Any], path: Path, text: str) -> Any:
@@ -85,11 +98,7 @@ def check(data: dict[str, Any], path: Path, text: str) -> Any:
     if name is not None and name not in crafts.names():
         place = toml_place.describe(path, text, ("spacecraft", "model"))
         raise ProblemError(f"{name!r} is no craft; there is {', '.join(crafts.names())}", place)
-    file = crafts.module(name or crafts.names()[0]).MissionFile
-    try:
-        return file.model_validate(data)
-    except ValidationError as error:
-        raise explain(error, path, text, data, file) from None
+    return validated(crafts.module(name or crafts.names()[0]).MissionFile, data, path, text)
 
 
 def explain(error: ValidationError, path: Path, text: str, data: dict[str, Any], top: Any) -> ProblemError:

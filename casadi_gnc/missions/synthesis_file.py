@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from casadi_gnc.errors import ProblemError, SynthesisError
 from casadi_gnc.missions import loading
@@ -130,14 +130,8 @@ class SynthesisCase:
 
 def load_synthesis(problem: str | Path) -> SynthesisCase:
     """Return the case of a synthesis file, given by path or shipped name; raise `ProblemError`."""
-    path, text, data = loading.read(problem)
-    if data.get("kind") != "synthesis":
-        place = describe(path, text, ("kind",))
-        raise ProblemError(f'kind is {data.get("kind")!r}; this command takes a file of kind "synthesis"', place)
-    try:
-        model = SynthesisModel.model_validate(data)
-    except ValidationError as error:
-        raise loading.explain(error, path, text, data, SynthesisModel) from None
+    path, text, data = loading.read_kind(problem, "synthesis")
+    model: SynthesisModel = loading.validated(SynthesisModel, data, path, text)
     given = {key: value for key, value in model.recipe if value is not None and key != "type"}
     arguments = {key: _array(value, describe(path, text, ("recipe", key))) for key, value in given.items()}
     return SynthesisCase(path.stem, model.title, model.recipe.type, arguments, model.backend)

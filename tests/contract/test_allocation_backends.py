@@ -221,10 +221,10 @@ def test_wrong_shapes_are_refused(name):
         allocator.solve(oracle.COMMAND, [1.0, 2.0, 3.0])
 
 
-def test_uncertainty_is_refused_by_a_back_end_for_quadratic_programs(name):
+@pytest.mark.parametrize("plain", [n for n in NAMES if Capability.ROBUST not in backends.module(n).CAPABILITIES])
+def test_uncertainty_is_refused_by_a_back_end_for_quadratic_programs(plain):
+    name = need(plain)
     robust, certain = CASES["5 mm, random 0"].problem, CASES["no error"].problem
-    if Capability.ROBUST in backends.module(name).CAPABILITIES:
-        pytest.skip("it takes uncertainty")
     with pytest.raises(AllocationError, match=f"'{name}' solves problems without uncertainty only; leave coupling"):
         Allocator(robust, name)
     allocator = Allocator(certain, name)

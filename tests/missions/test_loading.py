@@ -35,7 +35,7 @@ CASES = {
     "direction": (GOOD, "[0, 1, 0], [-1, 0, 0], [0, 0, 1],", "[0, 1, 0], [-1, 1, 0], [0, 0, 1],", "thruster 2: a direction of length 1.414"),
     "count": (GOOD, "  [0, 0, 1], [0, -1, 0], [1, 0, 0],\n", "", "12 positions but 9 directions"),
     "broken samples": (GOOD, "sample_period_s = 0.1", "sample_period_s = 0.7", "expected a whole number"),
-    "wrong kind": (GOOD, 'kind = "mission"', 'kind = "voyage"', "kind is 'voyage'; only a file of kind \"mission\""),
+    "wrong kind": (GOOD, 'kind = "mission"', 'kind = "voyage"', "kind is 'voyage'; this takes a file of kind \"mission\""),
     "no toml": (GOOD, "[truth]", "[truth", "is not valid TOML"),
     "unknown law": (GOOD, 'type = "rate_damping"', 'type = "magic"', r"scheme\[1\].law: unknown type 'magic'; known: rate_damping"),
     "negative gain": (GOOD, "rate_gain = 0.4 }", "rate_gain = -0.4 }", r"scheme\[1\].law.rate_gain: .*greater than 0, got -0.4"),
