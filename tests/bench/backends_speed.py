@@ -40,9 +40,8 @@ def main() -> None:
     count = parser.parse_args().count
     for title, error in (("centre of mass +-5 mm", 5e-3), ("no uncertainty", 0.0)):
         problem = oracle.huang2020(error)
-        print(
-            f"\n| {title} | wall, median / max [ms] | solver's own [ms] | relative gap, median / max |\n|---|---|---|---|"
-        )
+        print(f"\n| {title} | wall, median / max [ms] | solver's own [ms] | relative gap, median / max |")
+        print("|---|---|---|---|")
         for name in backends.available():
             if not problem.is_robust or backends.Capability.ROBUST in backends.module(name).CAPABILITIES:
                 print(measure(problem, name, min(count, SLOW.get(name, count))), flush=True)
