@@ -14,6 +14,11 @@ _SENTENCES = {
     64: "The simulated state is no longer finite or credible; the flight's metrics mean nothing.",
     128: "The law's memory was no longer finite or credible; it was started afresh.",
     256: "The law's command was not finite; none was given on that axis.",
+    512: "The craft was inside the keep-out sphere of its target.",
+    1024: "The effectiveness was nearly singular; a damped inverse gave up some of the wanted effort.",
+    2048: "The craft were too close for the actuator's far-field model; its efforts cannot be trusted.",
+    4096: "The craft closed in faster than the approach-speed limit.",
+    8192: "A wheel was at its speed limit; it can brake but no longer accelerate.",
 }
 
 
@@ -35,6 +40,11 @@ class StepStatus(IntFlag):
     DIVERGED = 64
     MEMORY_RESET = 128
     COMMAND_REPLACED = 256
+    KEEP_OUT_ENTERED = 512
+    ALLOCATION_SINGULAR = 1024
+    NEAR_FIELD = 2048
+    APPROACH_TOO_FAST = 4096
+    WHEEL_SATURATED = 8192
 
     @property
     def sentences(self) -> list[str]:

@@ -29,7 +29,7 @@ def linearise() -> np.ndarray:
     x_next, m_next, *_ = loop(t, x, m, force, good)
     moving = ca.vertcat(x[3:], m)  # the attitude does not act on this loop
     jacobian = ca.Function("slope", [t, x, m, force, good], [ca.jacobian(ca.vertcat(x_next[3:], m_next), moving)])
-    return np.linalg.eigvals(np.array(jacobian(60.0, *(state[name] for name in ("x", "m", "force", "good")))))
+    return np.linalg.eigvals(np.array(jacobian(60.0, *(state[name] for name in ("x", "m", "actuators", "good")))))
 
 
 def flight_cost() -> ca.Function:

@@ -10,7 +10,14 @@
 
 from casadi_gnc.allocation.allocator import Allocator, solve
 from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, Saturation, best_weights, certify
-from casadi_gnc.allocation.in_flight import Allocate, OnlineInFlight, PseudoInverse, SolverInFlight, pseudo_inverse
+from casadi_gnc.allocation.in_flight import (
+    Allocate,
+    Direct,
+    OnlineInFlight,
+    PseudoInverse,
+    SolverInFlight,
+    pseudo_inverse,
+)
 from casadi_gnc.allocation.problem import AllocationProblem
 
 __all__ = [
@@ -20,6 +27,7 @@ __all__ = [
     "AllocationStatus",
     "Allocator",
     "Answer",
+    "Direct",
     "OnlineInFlight",
     "PseudoInverse",
     "Saturation",

@@ -27,14 +27,24 @@ def pseudo_inverse(effectiveness: ca.DM) -> ca.DM:
 
 @dataclass(frozen=True, eq=False)
 class PseudoInverse:
-    """Allocate by the clipped pseudo-inverse, as a CasADi expression; `effectiveness` has full row rank."""
+    """Allocate by the clipped pseudo-inverse, as a CasADi expression; the effectiveness has full row rank."""
 
-    effectiveness: ca.DM
     report = Layout()
 
-    def expression(self, command: Any, previous: Any, lower: Any, upper: Any) -> Any:
-        """Return F, (N,), as an expression of its arguments."""
-        return bounds.clip(ca.mtimes(pseudo_inverse(self.effectiveness), command), lower, upper)
+    def expression(self, command: Any, previous: Any, lower: Any, upper: Any, effectiveness: Any) -> Any:
+        """Return F, (N,), as an expression of its arguments; `effectiveness` is (3, N)."""
+        return bounds.clip(ca.mtimes(pseudo_inverse(effectiveness), command), lower, upper)
+
+
+@dataclass(frozen=True, eq=False)
+class Direct:
+    """Tell each actuator its own row of the effort, inside its bounds; the effectiveness is the identity."""
+
+    report = Layout()
+
+    def expression(self, command: Any, previous: Any, lower: Any, upper: Any, effectiveness: Any) -> Any:
+        """Return the clipped command, (N,)."""
+        return bounds.clip(command, lower, upper)
 
 
 #: What one sample of an allocation leaves in the record.

@@ -148,4 +148,4 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
 def _shown(metric: Metric, value: float | None) -> str:
     if value is not None:
         return f"{value:.5g}"
-    return "never" if metric.kind == "settling" else "-"
+    return "never" if metric.kind in ("settling", "reaching") else "-"

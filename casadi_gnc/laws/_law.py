@@ -26,7 +26,7 @@ def gain(
     note: str,
     *,
     symbol: str = "",
-    size: int = 1,
+    size: int | tuple[int, int] = 1,
     minimum: float | None = None,
     above: float | None = None,
     default: Any = dataclasses.MISSING,
@@ -36,11 +36,17 @@ def gain(
     Parameters
     ----------
     unit, note, symbol : shown in the schema; `symbol` is the paper's.
-    size : 1, or the number of elements of a list.
+    size : 1, the number of elements of a list, or (rows, columns) of a matrix.
     minimum, above : closed or open lower bound of every element.
     default : value when the file is silent; without one the key is required.
     """
     about = {"unit": unit, "note": note, "symbol": symbol, "size": size, "minimum": minimum, "above": above}
+    return dataclasses.field(metadata=about, default=default, kw_only=True)
+
+
+def option(note: str, *choices: str, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a choice of a law that a problem file makes: one of some words, or without `choices` true or false."""
+    about = {"note": note, "symbol": "", "unit": "", "choices": choices or (True, False)}
     return dataclasses.field(metadata=about, default=default, kw_only=True)
 
 
@@ -63,12 +69,18 @@ class Law:
     inputs: ClassVar[Layout] = Layout()
     #: Memory, what the law carries from one sample to the next.
     memory: ClassVar[Layout] = Layout()
+    #: Funnels that the law keeps to: name of the field that takes it -> measured signal that it bounds.
+    funnels: ClassVar[dict[str, str]] = {}
     #: What the law shows besides its command, for records and plots.
     outputs: ClassVar[Layout] = Layout()
 
     def __post_init__(self) -> None:
         for name, declared in gains_of(type(self)).items():
             value, about = getattr(self, name), declared.metadata
+            if "choices" in about:
+                if value not in about["choices"]:
+                    raise LawError(f"{name} is {value!r}, expected one of {', '.join(map(repr, about['choices']))}")
+                continue
             if value is None or not exact.is_number(value):
                 continue
             numbers = ca.DM(value).nonzeros()
@@ -90,6 +102,9 @@ class Law:
         """Return -1 where the source's sign is kept as printed, +1 where it is corrected."""
         return -1 if erratum in self.printed else 1
 
+    def check_hold(self) -> None:
+        """Raise `LawError` if the law cannot work at its sample period; say which one it could keep."""
+
     def start(self, t: Any, y: Any) -> Any:
         """Return the memory at the first measurement y: every estimate is zero."""
         return ca.DM.zeros(self.memory.size)
@@ -99,7 +114,7 @@ class Law:
         return m
 
     def command(self, t: Any, y: Any, m: Any) -> Any:
-        """Return the wanted effort, (3,), [N m], before any limit."""
+        """Return the wanted effort, (R,), in the units of the craft's efforts, before any limit."""
         raise TypeError(f"{type(self).__name__} defines no command")
 
     def rate(self, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any:
@@ -119,5 +134,5 @@ class Law:
 
 
 def gains_of(law: type[Law]) -> dict[str, dataclasses.Field]:
-    """Return the fields of a law that a problem file gives, by name."""
+    """Return the gains and options of a law that a problem file gives, by name."""
     return {field.name: field for field in dataclasses.fields(law) if "unit" in field.metadata}

@@ -72,6 +72,7 @@ class PrescribedPerformance(Law):
     braking_share: Any = gain("-", "share of max_acceleration to plan braking with", above=0.0, default=0.5)
     braking_floor: Any = gain("-", "MRP at which the braking limit stops shrinking", above=0.0, default=1e-6)
 
+    funnels = {"funnel": "mrp"}
     inputs = Layout((Signal("mrp", 3, "-"), Signal("rate", 3, "rad/s")))
     memory = Layout(
         (Signal("rate_command", 3, "rad/s"), Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m s"))

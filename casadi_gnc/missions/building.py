@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import LawError, ProblemError
 from casadi_gnc.laws import LAWS, PerformanceFunnel, gains_of
 from casadi_gnc.missions import crafts, schema, tapes
 from casadi_gnc.missions.crafts import Craft, Where
-from casadi_gnc.missions.mission import Funnel, Metric, Mission, Scheme, Timing
+from casadi_gnc.missions.mission import Funnel, Metric, Mission, Noise, Scheme, Timing
 from casadi_gnc.missions.toml_place import describe
 
 
@@ -28,7 +29,7 @@ def build(model: Any, path: Path, text: str) -> Mission:
     where = partial(describe, path, text)
     craft: Craft = crafts.module(model.spacecraft.model).build(model, where)
     _check_start(craft, where)
-    funnel = _funnel(model.funnel, craft, where)
+    funnels = tuple(_funnel(table, i, craft, where) for i, table in enumerate(model.funnel))
     given = model.timing
     timing = Timing(given.mode, given.sample_period_s, given.duration_s, given.plant_substeps)
     mission = Mission(
@@ -36,8 +37,11 @@ def build(model: Any, path: Path, text: str) -> Mission:
         truth=craft.plant,
         start=craft.start,
         timing=timing,
-        schemes=tuple(_scheme(scheme, i, craft, funnel, timing, where) for i, scheme in enumerate(model.scheme)),
-        funnel=funnel,
+        schemes=tuple(_scheme(scheme, i, craft, funnels, timing, where) for i, scheme in enumerate(model.scheme)),
+        funnels=funnels,
+        noise=_noise(model.noise, timing, where),
+        panels=craft.panels,
+        notes=craft.notes,
         title=model.title,
         source=model.source,
         digest=hashlib.sha256(text.encode()).hexdigest(),
@@ -56,10 +60,14 @@ def _with_metrics(mission: Mission, model: schema.MissionModel, where: Where) ->
                 raise ProblemError(message, where(("metric", i, "signal")))
         unit = (
             "s"
-            if metric.kind == "settling"
+            if metric.kind in ("settling", "reaching")
             else tapes.row_layout(mission, mission.schemes[0]).signal(metric.signal).unit
         )
-        metrics.append(Metric(metric.name, metric.kind, metric.signal, metric.threshold or 0.0, metric.after_s, unit))
+        norm = metric.norm or ("two" if metric.kind == "sample_sum" else "max")
+        until = metric.until_s or float("inf")
+        metrics.append(
+            Metric(metric.name, metric.kind, metric.signal, metric.threshold or 0.0, metric.after_s, unit, until, norm)
+        )
     return dataclasses.replace(mission, metrics=tuple(metrics))
 
 
@@ -74,20 +82,31 @@ def _check_start(craft: Craft, where: Where) -> None:
 
 
 def _first_measurement(craft: Craft) -> list[float]:
-    return ca.DM(craft.plant.measure(0.0, ca.DM(craft.start))).nonzeros()
+    quiet = ca.DM.zeros(craft.plant.noise.size)
+    return list(np.array(ca.DM(craft.plant.measure(0.0, ca.DM(craft.start), quiet))).ravel())
 
 
-def _funnel(table: schema.FunnelModel | None, craft: Craft, where: Where) -> Funnel | None:
-    """Return the mission's funnel; the start must lie inside."""
-    if table is None:
-        return None
+def _noise(table: schema.NoiseModel, timing: Timing, where: Where) -> Noise:
+    """Return how noise is drawn; its period must be a whole number of sample periods."""
+    every = 1.0 if table.period_s is None else table.period_s / timing.sample_period
+    if every < 0.5 or abs(every - round(every)) > 1e-6 * every:
+        raise ProblemError(
+            f"period_s is {table.period_s:g}, {every:.6g} times sample_period_s {timing.sample_period:g}; "
+            "expected a whole multiple",
+            where(("noise", "period_s")),
+        )
+    return Noise(table.seed, round(every), table.truncation_sigma or float("inf"))
+
+
+def _funnel(table: schema.FunnelModel, index: int, craft: Craft, where: Where) -> Funnel:
+    """Return one of the mission's funnels; the start must lie inside."""
     measured = craft.plant.measurement
     if table.signal not in measured:
         known = ", ".join(measured.names)
-        raise ProblemError(f"{table.signal!r} is not measured; there is {known}", where(("funnel", "signal")))
+        raise ProblemError(f"{table.signal!r} is not measured; there is {known}", where(("funnel", index, "signal")))
     expected = measured.signal(table.signal).size
     if len(table.start) != expected:
-        place = where(("funnel", "start"))
+        place = where(("funnel", index, "start"))
         raise ProblemError(f"{len(table.start)} axes, but {table.signal} has {expected}", place)
     start = _first_measurement(craft)[measured.place(table.signal)]
     for axis, (s, rho, below, above) in enumerate(zip(start, table.start, table.below, table.above, strict=True), 1):
@@ -95,17 +114,17 @@ def _funnel(table: schema.FunnelModel | None, craft: Craft, where: Where) -> Fun
             raise ProblemError(
                 f"axis {axis} starts at {s:g}, outside its funnel from {-below * rho:g} to {above * rho:g}; "
                 "widen start, below or above",
-                where(("funnel", "start")),
+                where(("funnel", index, "start")),
             )
     columns = (ca.DM(getattr(table, key)) for key in ("start", "floor", "decay_per_s", "below", "above"))
     return Funnel(table.signal, PerformanceFunnel(*columns))
 
 
 def _scheme(
-    model: schema.SchemeModel,
+    model: Any,
     index: int,
     craft: Craft,
-    funnel: Funnel | None,
+    funnels: tuple[Funnel, ...],
     timing: Timing,
     where: Where,
 ) -> Scheme:
@@ -120,13 +139,17 @@ def _scheme(
     gains = {key: getattr(table, key) for key in gains_of(law)}
     gains = {key: ca.DM(value) if isinstance(value, list) else value for key, value in gains.items()}
     hold = timing.sample_period if timing.mode == "sampled" else 0.0
-    if "funnel" in {field.name for field in dataclasses.fields(law)}:
-        if funnel is None:
-            place = where(("scheme", index, "law"))
-            raise ProblemError(f"the law {table.type!r} needs a [funnel] table, and the file has none", place)
-        if funnel.signal != "mrp":
-            place = where(("funnel", "signal"))
-            raise ProblemError(f"the law {table.type!r} tracks the attitude; its funnel must be on mrp", place)
-        gains["funnel"] = funnel.bounds
-    law = law(body=craft.believed, hold=hold, printed=frozenset(named), **gains)
-    return Scheme(model.name, law, craft.actuation(model), model.feedback, model.title)
+    for key, signal in law.funnels.items():
+        bounds = next((funnel.bounds for funnel in funnels if funnel.signal == signal), None)
+        if bounds is None:
+            found = ", ".join(funnel.signal for funnel in funnels) or "none"
+            message = f"the law {table.type!r} needs a [[funnel]] on {signal}, and the file has {found}"
+            raise ProblemError(message, where(("scheme", index, "law")))
+        gains[key] = bounds
+    if "body" in {field.name for field in dataclasses.fields(law)}:
+        gains["body"] = craft.believed
+    try:
+        made = law(hold=hold, printed=frozenset(named), **gains)
+        return Scheme(model.name, made, craft.actuation(model), model.feedback, model.title)
+    except LawError as error:
+        raise ProblemError(str(error), where(("scheme", index, "law"))) from None

@@ -19,6 +19,7 @@ from casadi_gnc.allocation import Allocate, OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
 from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.missions.tapes import Tapes
+from casadi_gnc.noise import uniform_count, uniforms
 from casadi_gnc.status import StepStatus
 
 
@@ -28,7 +29,7 @@ class Carried:
 
     x: np.ndarray
     m: np.ndarray
-    force: np.ndarray
+    actuators: np.ndarray
     good: np.ndarray
     tally: np.ndarray
 
@@ -38,8 +39,8 @@ class Engine(Protocol):
 
     name: str
 
-    def first_memory(self, y: np.ndarray) -> np.ndarray:
-        """Return the law's memory at the first measurement."""
+    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first measurement, and the law's memory at it."""
         ...
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
@@ -48,10 +49,11 @@ class Engine(Protocol):
 
 
 class _Flight(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_void_p) for name in ("x", "m", "force", "good", "tally", "record")] + [
+    _fields_ = [(name, ctypes.c_void_p) for name in ("x", "m", "actuators", "good", "tally", "record")] + [
         (name, ctypes.c_long) for name in ("first", "samples", "decimation")
     ]
     _fields_ += [(name, ctypes.c_void_p) for name in ("allocator", "allocation_data", "allocation_work")]
+    _fields_ += [("seed", ctypes.c_ulonglong)]
 
 
 _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 7)
@@ -74,8 +76,11 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         states=plant.state.size,
         measurements=plant.measurement.size,
         memory=scheme.law.memory.size,
-        efforts=scheme.actuation.effectiveness.shape[0],
-        forces=plant.inputs.size,
+        efforts=scheme.actuation.effort.size,
+        actuators=plant.inputs.size,
+        noise=plant.noise.size,
+        noise_every=mission.noise.every,
+        uniforms=uniform_count(plant.noise.size),
         report=scheme.actuation.allocator.report.size,
         row=tapes.row.size,
         tally=tapes.tally.size,
@@ -118,23 +123,26 @@ class CompiledEngine:
             self._solve = allocator.start()
         library = compilers.load(self.source, include=include, flags=flags, units=units, compiler=self.compiler)
         self._start, self._fly, self._memory = library.gnc_start, library.gnc_fly, scheme.law.memory.size
+        self._measurements, self._seed = mission.truth.measurement.size, mission.noise.seed
         self._fly.restype, self._fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
         self._failure: BaseException | None = None
         self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
         self._callback = _ALLOCATOR(self._allocate)
 
-    def first_memory(self, y: np.ndarray) -> np.ndarray:
-        """Return the law's memory at the first measurement."""
-        memory = np.zeros(self._memory)
-        self._start(ctypes.c_void_p(y.ctypes.data), ctypes.c_void_p(memory.ctypes.data))
-        return memory
+    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first measurement, and the law's memory at it."""
+        memory, measured = np.zeros(self._memory), np.zeros(self._measurements)
+        at, m, good = (ctypes.c_void_p(column.ctypes.data) for column in (x, memory, measured))
+        self._start(at, ctypes.c_ulonglong(self._seed), m, good)
+        return measured, memory
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly in one call; an exception of the allocator (or Ctrl-C in it) is raised here."""
-        columns = (carried.x, carried.m, carried.force, carried.good, carried.tally, record)
+        columns = (carried.x, carried.m, carried.actuators, carried.good, carried.tally, record)
         allocator = None if self._solve is None else ctypes.cast(self._callback, ctypes.c_void_p)
         memory = self._online.memory if self._online is not None else (None, None)
-        flight = _Flight(*(column.ctypes.data for column in columns), first, samples, decimation, allocator, *memory)
+        pointers = (column.ctypes.data for column in columns)
+        flight = _Flight(*pointers, first, samples, decimation, allocator, *memory, self._seed)
         flown = self._fly(ctypes.byref(flight))
         if self._failure is not None:
             failure, self._failure = self._failure, None
@@ -142,7 +150,7 @@ class CompiledEngine:
         return int(flown)
 
     def _allocate(self, *arguments: Any) -> int:
-        limited, previous, lower, upper, forces, status, report = arguments
+        limited, previous, lower, upper, actuators, status, report = arguments
         rows, count = self._sizes
 
         def view(pointer: Any, size: int) -> np.ndarray:
@@ -151,7 +159,7 @@ class CompiledEngine:
         assert self._solve is not None
         try:
             found = self._solve(view(limited, rows), view(previous, count), view(lower, count), view(upper, count))
-            view(forces, count)[:], status[0] = found[0], float(found[1])
+            view(actuators, count)[:], status[0] = found[0], float(found[1])
             if self._report:
                 view(report, self._report)[:] = found[2]
         except BaseException as error:  # nothing may propagate through C; `run` raises it again
@@ -183,6 +191,20 @@ class _Tape:
         return self._out[0].copy() if len(self._out) == 1 else [column.copy() for column in self._out]
 
 
+@dataclass(eq=False)
+class _Sample:
+    """What one evaluation of the controller leaves behind; `y` is the accepted measurement."""
+
+    y: np.ndarray
+    m: np.ndarray
+    wanted: np.ndarray
+    limited: np.ndarray
+    flags: np.ndarray
+    actuators: np.ndarray
+    allocation_flags: float
+    report: np.ndarray
+
+
 class VirtualMachineEngine:
     """Fly on CasADi's virtual machine: no compiler needed, some fifty times slower."""
 
@@ -190,66 +212,67 @@ class VirtualMachineEngine:
 
     def __init__(self, mission: Mission, scheme: Scheme, tapes: Tapes) -> None:
         self._tape = {name: _Tape(function) for name, function in tapes.functions.items()}
-        self._timing = mission.timing
-        self._states = mission.truth.state.size
+        self._timing, self._noise = mission.timing, mission.noise
+        self._states, self._normals = mission.truth.state.size, mission.truth.noise.size
+        self._drawn = (-1, np.zeros(self._normals))
         self._report = np.zeros(scheme.actuation.allocator.report.size)
         self._solve: Allocate | None = None if tapes.symbolic else scheme.actuation.allocator.start()
 
-    def first_memory(self, y: np.ndarray) -> np.ndarray:
-        """Return the law's memory at the first measurement."""
-        return self._tape["start"](y)
+    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the first measurement, and the law's memory at it."""
+        measured = self._tape["sense"](0.0, x, self._draw(0))
+        return measured, self._tape["start"](measured)
+
+    def _draw(self, sample: int) -> np.ndarray:
+        """Return the normal numbers of a sample, held over `every` sample periods."""
+        draw = sample // self._noise.every
+        if self._normals and draw != self._drawn[0]:
+            uniform = uniforms(self._noise.seed, draw, uniform_count(self._normals))
+            self._drawn = (draw, self._tape["draw"](uniform))
+        return self._drawn[1]
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly sample by sample, as the loop of `flight.c.j2` does."""
         tape, kept = self._tape, 0
         for k in range(first, first + samples):
-            t = k * self._timing.sample_period
-            accepted, m, wanted, limited, flags, force, noted, report = self._control(carried, t, carried.x, carried.m)
-            carried.good[:] = accepted
-            row = tape["observe"](t, carried.x, accepted, m, wanted, limited, force, flags, noted, report)
+            t, noise = k * self._timing.sample_period, self._draw(k)
+            s = self._control(carried, t, carried.x, carried.m, noise)
+            flags = s.flags + s.allocation_flags + tape["judge"](s.y, s.limited, s.actuators)
+            carried.good[:] = s.y
+            row = tape["observe"](t, carried.x, s.y, s.m, s.wanted, s.limited, s.actuators, flags, s.report)
             carried.tally[:] = tape["tally"](row, carried.tally)
             if k % decimation == 0:
                 record[kept] = row
                 kept += 1
-            self._advance(carried, t, accepted, m, wanted, limited, force)
+            self._advance(carried, t, noise, s)
             carried.x[:] = tape["settle"](carried.x)
-            carried.force[:] = force
+            carried.actuators[:] = s.actuators
         return samples
 
-    def _control(self, carried: Carried, t: float, x: np.ndarray, m: np.ndarray) -> tuple:
-        tape = self._tape
-        y = tape["sense"](t, x)
-        accepted, m, wanted, limited, lower, upper, flags = tape["before"](t, y, carried.good, m, carried.force)
+    def _control(self, carried: Carried, t: float, x: np.ndarray, m: np.ndarray, noise: np.ndarray) -> _Sample:
+        tape, last = self._tape, carried.actuators
+        y = tape["sense"](t, x, noise)
+        accepted, m, wanted, limited, lower, upper, flags = tape["before"](t, y, carried.good, m, last)
         if self._solve is None:
-            return (
-                accepted,
-                m,
-                wanted,
-                limited,
-                flags,
-                tape["allocate"](limited, carried.force, lower, upper),
-                0.0,
-                self._report,
-            )
-        force, noted, report = self._solve(limited, carried.force.copy(), lower, upper)
-        return accepted, m, wanted, limited, flags, force, float(noted), report
+            told = tape["allocate"](accepted, limited, last, lower, upper)
+            return _Sample(accepted, m, wanted, limited, flags, told, 0.0, self._report)
+        told, noted, report = self._solve(limited, last.copy(), lower, upper)
+        return _Sample(accepted, m, wanted, limited, flags, told, float(noted), report)
 
-    def _advance(
-        self, carried: Carried, t: float, accepted: Any, m: Any, wanted: Any, limited: Any, force: Any
-    ) -> None:
+    def _advance(self, carried: Carried, t: float, noise: np.ndarray, s: _Sample) -> None:
         tape, h, n = self._tape, self._timing.sample_period, self._states
         if self._timing.mode == "sampled":
-            carried.m[:] = tape["after"](t, accepted, m, wanted, limited, force)
+            carried.m[:] = tape["after"](t, s.y, s.m, s.wanted, s.limited, s.actuators)
             step = h / self._timing.substeps
             for i in range(self._timing.substeps):
-                carried.x[:] = tape["plant"](t + i * step, carried.x, force)
+                carried.x[:] = tape["plant"](t + i * step, carried.x, s.actuators, noise)
             return
-        state = np.concatenate([carried.x, m])
-        slopes = [tape["flow"](t, carried.x, accepted, m, wanted, limited, force)]
+        state = np.concatenate([carried.x, s.m])
+        slopes = [tape["flow"](t, carried.x, s.y, s.m, s.wanted, s.limited, s.actuators, noise)]
         for length in (h / 2, h / 2, h):
             moved = tape["point"](state, slopes[-1], length)
-            x, m_stage = moved[:n], moved[n:]
-            y, m_stage, u, v, _, f, *_ = self._control(carried, t + length, x, m_stage)
-            slopes.append(tape["flow"](t + length, x, y, m_stage, u, v, f))
+            x, at = moved[:n], t + length
+            stage = self._control(carried, at, x, moved[n:], noise)
+            slopes.append(tape["flow"](at, x, stage.y, stage.m, stage.wanted, stage.limited, stage.actuators, noise))
         joined = tape["join"](state, *slopes)
         carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from importlib import metadata
 from typing import Any, Literal
 
-import casadi as ca
 import numpy as np
 
 from casadi_gnc.embedded.printer import Math
@@ -80,6 +79,7 @@ def fly(
         "maths": maths if runner.name == "c" else "libm",
         "mode": mission.timing.mode,
         "feedback": chosen.feedback,
+        "seed": mission.noise.seed if mission.truth.noise.size else None,
         "problem_sha256": mission.digest,
         "casadi_gnc": metadata.version("casadi-gnc"),
         "casadi": metadata.version("casadi"),
@@ -99,7 +99,7 @@ def fly(
         statuses=raised,
         made=made,
         seconds=seconds,
-        notes=(*notes, *_undefined(mission, values, raised)),
+        notes=(*mission.notes, *notes, *_undefined(mission, values, raised)),
     )
 
 
@@ -114,12 +114,12 @@ def _room(rows: int, columns: int) -> np.ndarray:
 def begin(mission: Mission, built: tapes.Tapes, runner: Engine) -> Carried:
     """Return the columns at t = 0: the mission's start, the law's first memory, actuators at rest."""
     x = np.array(mission.start, dtype=float)
-    y = np.array(mission.truth.measure(0.0, ca.DM(x))).ravel()
+    good, memory = runner.first(x)
     return Carried(
         x=x,
-        m=runner.first_memory(y),
-        force=np.zeros(mission.truth.inputs.size),
-        good=y.copy(),
+        m=memory,
+        actuators=np.zeros(mission.truth.inputs.size),
+        good=good,
         tally=metrics.fresh(mission.metrics, built.tally),
     )
 

@@ -11,7 +11,6 @@ from pydantic import BaseModel, ValidationError
 
 from casadi_gnc import assets
 from casadi_gnc.errors import ProblemError
-from casadi_gnc.laws import LAWS
 from casadi_gnc.missions import building, crafts, schema, toml_place
 from casadi_gnc.missions.mission import Mission
 
@@ -157,11 +156,7 @@ def _near_key(key: str, location: tuple[str | int, ...], top: Any) -> str:
                 break
             # In a union the table itself tells which alternative is meant.
             model = kinds[0]
-        elif isinstance(part, str) and part in LAWS:
-            model = next(m for m in _alternatives() if m.model_fields["type"].annotation.__args__[0] == part)
+        elif isinstance(part, str) and part in schema.LAW_MODELS:
+            model = schema.LAW_MODELS[part]
     near = difflib.get_close_matches(key, list(model.model_fields), 1)
     return f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(model.model_fields)}"
-
-
-def _alternatives() -> list[Any]:
-    return list(schema.LawModel.__origin__.__args__)  # type: ignore[attr-defined]

@@ -3,12 +3,18 @@
 ===========  ================================================================================
 kind         value
 ===========  ================================================================================
-settling     first time after which the max-norm of the signal stays below `threshold` to the
-             end, [s]; none if it never does
-peak         largest max-norm of the signal from time `after` on
-sample_sum   sum over all samples of the 2-norm of the signal, without a time step (as papers
-             print "accumulated" torque and force)
+settling     first time after which the norm of the signal stays below `threshold` to the end,
+             [s]; none if it never does
+reaching     first time at which the norm is below `threshold`, [s]; none if it never is
+peak, least  largest and smallest norm in the window
+final        norm at the last sample of the window
+mean         mean of the norm over the samples of the window
+sample_sum   sum of the norm over the samples of the window, without a time step (as papers print
+             "accumulated" torque and force)
 ===========  ================================================================================
+
+The norm is the largest magnitude ("max") or the 2-norm ("two"); the window goes from `after` to
+`until`, both included. Settling looks at the whole flight.
 
 The folds are CasADi functions like everything else: every engine computes them from every sample,
 however few samples are kept. Status bits are counted in the same way, and their first times kept.
@@ -61,19 +67,30 @@ def _column(metric: Metric) -> str:
 
 
 def _next(metric: Metric, signal: Any, time: Any, so_far: Any) -> Any:
-    size = bounds.largest(ca.fabs(signal))
+    size = ca.sqrt(ca.sumsqr(signal)) if metric.norm == "two" else bounds.largest(ca.fabs(signal))
     if metric.kind == "settling":
         return ca.if_else(size < metric.threshold, so_far, time)
-    if metric.kind == "peak":
-        return ca.if_else(time >= metric.after, bounds.maximum(size, so_far), so_far)
-    return so_far + ca.sqrt(ca.sumsqr(signal))
+    fresh_one = so_far < 0  # NEVER: norms and times are not negative
+    value = {
+        "reaching": ca.if_else(ca.logic_and(fresh_one, size < metric.threshold), time, so_far),
+        "peak": bounds.maximum(size, so_far),
+        "least": ca.if_else(fresh_one, size, bounds.minimum(size, so_far)),
+        "final": size,
+        "mean": so_far + size,
+        "sample_sum": so_far + size,
+    }[metric.kind]
+    conditions = [time >= metric.after] if metric.after > 0 else []
+    conditions += [time <= metric.until] if metric.until < math.inf else []
+    for condition in conditions:
+        value = ca.if_else(condition, value, so_far)
+    return value
 
 
 def fresh(metrics: tuple[Metric, ...], layout: Layout) -> np.ndarray:
     """Return the tally before the first sample."""
     tally = np.zeros(layout.size)
     for metric in metrics:
-        tally[layout.place(_column(metric))] = 0.0 if metric.kind == "sample_sum" else NEVER
+        tally[layout.place(_column(metric))] = 0.0 if metric.kind in ("sample_sum", "mean") else NEVER
     for bit in StepStatus:
         tally[layout.place(f"first_{bit.name}")] = NEVER
     return tally
@@ -84,22 +101,32 @@ def read(
 ) -> dict[str, float | None]:
     """Return the values of the metrics after the sample at time `last` [s].
 
-    None stands for "never" (a settling), "nowhere" (a peak after the end), and for every metric of a
+    None stands for "never" (a settling, a reaching), "nowhere" (an empty window), and for every metric of a
     flight that diverged: comparisons pass over what is not a number, so nothing can be said.
     """
     values: dict[str, float | None] = {}
     diverged = StepStatus.DIVERGED in statuses(layout, tally)
     for metric in metrics:
         value = float(tally[layout.place(_column(metric))][0])
-        if diverged or not math.isfinite(value) or (metric.kind == "peak" and value < 0):
+        nowhere = metric.kind != "settling" and value < 0
+        if diverged or not math.isfinite(value) or nowhere:
             values[metric.name] = None
         elif metric.kind == "settling":
             # The signal was above its threshold at `value` for the last time, or never.
             settled = value + period if value >= 0 else 0.0
             values[metric.name] = settled if value < last else None
+        elif metric.kind == "mean":
+            count = _samples_within(metric, last, period)
+            values[metric.name] = value / count if count else None
         else:
             values[metric.name] = value
     return values
+
+
+def _samples_within(metric: Metric, last: float, period: float) -> int:
+    """Return how many samples the window holds, by the comparisons that the fold makes."""
+    samples = round(last / period) + 1
+    return int(sum(metric.after <= k * period <= metric.until for k in range(samples)))
 
 
 def statuses(layout: Layout, tally: np.ndarray) -> dict[StepStatus, tuple[int, float]]:

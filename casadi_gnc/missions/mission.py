@@ -5,32 +5,21 @@ schemes that could fly it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import casadi as ca
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.signals import Layout
+from casadi_gnc.plants import Plant
+from casadi_gnc.signals import Layout, Signal
+from casadi_gnc.status import StepStatus
 
 Mode = Literal["sampled", "continuous"]
 Feedback = Literal["achieved", "wanted"]
-
-
-class Plant(Protocol):
-    """What a mission needs of a plant (see `casadi_gnc.plants`)."""
-
-    @property
-    def state(self) -> Layout: ...
-    @property
-    def measurement(self) -> Layout: ...
-    @property
-    def inputs(self) -> Layout: ...
-    def measure(self, t: Any, x: Any) -> Any: ...
-    def rate(self, t: Any, x: Any, force: Any) -> Any: ...
-    def settle(self, x: Any) -> Any: ...
+MetricKind = Literal["settling", "reaching", "peak", "least", "final", "mean", "sample_sum"]
 
 
 @dataclass(frozen=True)
@@ -64,26 +53,66 @@ class Timing:
         return round(self.duration / self.sample_period) + 1
 
 
+@dataclass(frozen=True)
+class Noise:
+    """Say how the random numbers of a flight are drawn.
+
+    Parameters
+    ----------
+    seed : 0 to 2^64 - 1; the same seed gives the same flight on every machine.
+    every : sample periods from draw to draw; the numbers are held in between.
+    truncation : standard deviations beyond which a number is cut off.
+    """
+
+    seed: int = 1
+    every: int = 1
+    truncation: float = float("inf")
+
+
+#: The effort of a craft that only turns.
+TORQUE = Layout((Signal("torque", 3, "N m"),))
+
+
 @dataclass(frozen=True, eq=False)
 class Actuation:
     """Say how a wanted effort becomes actuator commands.
 
     Parameters
     ----------
-    effectiveness : believed A, (R, N).
-    lower, upper : (N,), amplitude bounds, [N].
-    rate : largest change [N/s], `inf` for none.
-    limit_below, limit_above : (R,), box of the virtual control, [N m].
+    effectiveness : believed A, (R, N), or a function of the measured signals (by name) that returns it.
+    lower, upper : (N,), amplitude bounds, unit of the actuators.
+    rate : largest change of an actuator per second, `inf` for none.
+    limit_below, limit_above : (R,), box of the virtual control, units of `effort`.
     allocator : an object with `report` and either `expression` (CasADi) or `start` (numpy).
+    effort : what the actuators make together, one signal a kind; R rows.
+    reach : function of the measured signals that returns further bounds, lower and upper, (N,) each.
+    judge : function (measured signals, limited effort, actuators) -> flags by status bit, on board.
     """
 
-    effectiveness: ca.DM
+    effectiveness: ca.DM | Callable[[Any], Any]
     lower: list[float]
     upper: list[float]
     rate: float
     limit_below: list[float]
     limit_above: list[float]
     allocator: Any
+    effort: Layout = TORQUE
+    reach: Callable[[Any], tuple[Any, Any]] | None = None
+    judge: Callable[[Any, Any, Any], dict[StepStatus, Any]] | None = None
+
+    def matrix(self, seen: Any) -> Any:
+        """Return the believed effectiveness, (R, N), at the measured signals `seen`."""
+        return self.effectiveness(seen) if callable(self.effectiveness) else self.effectiveness
+
+    def named(self, stage: str) -> Layout:
+        """Return the signals of an effort at a stage: "wanted", "limited" or "achieved".
+
+        A craft with one kind of effort has them by the stage's name; one with several, by stage and kind.
+        """
+        alone = len(self.effort.signals) == 1
+        return Layout(
+            tuple(replace(each, name=stage if alone else f"{stage}_{each.name}") for each in self.effort.signals)
+        )
 
     @property
     def is_symbolic(self) -> bool:
@@ -104,6 +133,7 @@ class Scheme:
     def __post_init__(self) -> None:
         if self.feedback not in ("achieved", "wanted"):
             raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
+        self.law.check_hold()
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,18 +149,43 @@ class Metric:
     """One number asked of a flight; kinds are defined in `casadi_gnc.missions.metrics`."""
 
     name: str
-    kind: Literal["settling", "peak", "sample_sum"]
+    kind: MetricKind
     signal: str
     threshold: float = 0.0
     after: float = 0.0
     unit: str = ""
+    until: float = float("inf")
+    norm: Literal["max", "two"] = "max"
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Say what one panel of a flight's picture shows.
+
+    Parameters
+    ----------
+    kind : "tracked" (a measured signal, in its funnel if it has one), "effort" (limited and achieved,
+        with limits), "actuators" (lines, or rows of a map where there are many), "lines".
+    signal : its name; of an effort, the name in the craft's `effort`.
+    label : what stands at the axis, without unit.
+    scale, unit : factor applied, and the unit that it gives.
+    logarithmic : of "lines": the magnitude on a logarithmic axis.
+    """
+
+    kind: Literal["tracked", "effort", "actuators", "lines"]
+    signal: str
+    label: str
+    scale: float = 1.0
+    unit: str = ""
+    logarithmic: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Mission:
     """Everything needed to fly; made by `casadi_gnc.load`, changed by `with_timing`, `with_scheme`.
 
-    `casadi.Function`s for analysis come from `plant`, `law`, `step` and `closed_loop`.
+    `casadi.Function`s for analysis come from `plant`, `law`, `step` and `closed_loop`. `notes` are
+    what a reader of every flight must know, e.g. that an orbit is no orbit.
     """
 
     name: str
@@ -139,7 +194,10 @@ class Mission:
     timing: Timing
     schemes: tuple[Scheme, ...]
     metrics: tuple[Metric, ...] = ()
-    funnel: Funnel | None = None
+    funnels: tuple[Funnel, ...] = ()
+    noise: Noise = Noise()
+    panels: tuple[Panel, ...] = ()
+    notes: tuple[str, ...] = ()
     title: str = ""
     source: str = ""
     digest: str = ""
@@ -173,7 +231,7 @@ class Mission:
         return replace(self, schemes=(scheme,))
 
     def plant(self) -> ca.Function:
-        """Return x' as a function (t, x, force) -> rate, with the ports of the plant's layouts."""
+        """Return x' as a function (t, x, actuators) -> rate without noise, with the ports of the plant's layouts."""
         from casadi_gnc.missions import functions
 
         return functions.plant_rate(self)
@@ -189,24 +247,24 @@ class Mission:
         return functions.law_function(self, self.scheme(scheme), parameters)
 
     def step(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
-        """Return one sample of the controller: (t, y, good, m, force, [p]) -> (force_next, m_next, ...)."""
+        """Return one sample of the controller: (t, y, good, m, actuators, [p]) -> (actuators_next, m_next, ...)."""
         from casadi_gnc.missions import functions
 
         return functions.step_function(self, self.scheme(scheme), parameters)
 
     def loop_start(self, scheme: str | None = None) -> dict[str, ca.DM]:
-        """Return x, m, force and good at t = 0, as `closed_loop` takes them."""
+        """Return x, m, actuators and good at t = 0, as `closed_loop` takes them."""
         from casadi_gnc.missions import functions
 
         return functions.loop_start(self, self.scheme(scheme))
 
     def closed_loop(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
-        """Return one sample period of the loop: (t, x, m, force, good, [p]) -> the same, later.
+        """Return one sample period of the loop: (t, x, m, actuators, good, [p]) -> the same, later.
 
         Ports: `t` [s]; `x`, the plant's state in the order of `truth.state`; `m`, the law's memory;
-        `force`, the previous forces; `good`, the last good measurement. Results: `x_next`, `m_next`,
-        `force_next`, `good_next`, `wanted`, `limited`. `loop_start` gives the first values. Only schemes
-        whose allocation is an expression ("pinv") have a closed loop.
+        `actuators`, what they were last told; `good`, the last good measurement. Results: `x_next`,
+        `m_next`, `actuators_next`, `good_next`, `wanted`, `limited`. `loop_start` gives the first values.
+        Noise is zero. Only schemes whose allocation is an expression have a closed loop.
         """
         from casadi_gnc.missions import functions
 

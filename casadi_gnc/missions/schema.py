@@ -16,6 +16,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from casadi_gnc import attitude
 from casadi_gnc.laws import LAWS, Law, gains_of
 from casadi_gnc.missions import matrices
+from casadi_gnc.missions.mission import MetricKind
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Rows = Annotated[list[Vector], Field(min_length=1)]
@@ -105,16 +106,22 @@ class TimingModel(Part):
 
 
 def _law_model(name: str, law: type[Law]) -> type[Part]:
-    """Return the model of a law's table, made from the gains that the law declares."""
+    """Return the model of a law's table, made from the gains and options that the law declares."""
     fields: dict[str, Any] = {"type": (Literal[name], ...)}
     for key, declared in gains_of(law).items():
         about = declared.metadata
+        if "choices" in about:
+            kind: Any = bool if True in about["choices"] else Literal[about["choices"]]
+            default = ... if declared.default is dataclasses.MISSING else declared.default
+            fields[key] = (kind, Field(default, description=about["note"]))
+            continue
         bounds = {"ge": about["minimum"], "gt": about["above"]}
         number: Any = Annotated[float, Field(**{k: v for k, v in bounds.items() if v is not None})]
+        kind = number
+        for size in reversed(about["size"] if isinstance(about["size"], tuple) else (about["size"],)):
+            kind = kind if size == 1 else Annotated[list[kind], Field(min_length=size, max_length=size)]
         if declared.default is None:
-            number = number | None
-        size = about["size"]
-        kind: Any = number if size == 1 else Annotated[list[number], Field(min_length=size, max_length=size)]
+            kind = kind | None
         symbol = f"{about['symbol']}, " if about["symbol"] else ""
         text = f"{symbol}{about['note']}" + (f" [{about['unit']}]" if about["unit"] else "")
         default = ... if declared.default is dataclasses.MISSING else declared.default
@@ -122,14 +129,19 @@ def _law_model(name: str, law: type[Law]) -> type[Part]:
     return create_model(f"{law.__name__}Gains", __base__=Part, __doc__=f"Gains of the law {name!r}.", **fields)
 
 
-LawModel = Annotated[
-    Union[tuple(_law_model(name, law) for name, law in LAWS.items())],  # noqa: UP007 - made at run time
-    Field(discriminator="type"),
-]
+#: Model of a law's table by the law's name in a file.
+LAW_MODELS = {name: _law_model(name, law) for name, law in LAWS.items()}
+
+
+def law_tables(*names: str) -> Any:
+    """Return the type of a scheme's `law`: the table of one of some laws, told apart by `type`."""
+    models = tuple(LAW_MODELS[name] for name in names)
+    union: Any = Union.__getitem__(models)  # made at run time
+    return Annotated[union, Field(discriminator="type")] if len(models) > 1 else models[0]
 
 
 class SchemeModel(Part):
-    """One way to fly the mission; a craft adds how it allocates."""
+    """One way to fly the mission; a craft adds its laws (`law`), limits and how it allocates."""
 
     name: Name
     title: str = ""
@@ -137,24 +149,38 @@ class SchemeModel(Part):
         default="achieved", description="what observers and anti-windup are told"
     )
     as_printed: bool | list[str] = Field(default=False, description="keep the paper's errata: all, or those named")
-    torque_limit_N_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
-    law: LawModel  # type: ignore[valid-type]
 
 
 class MetricModel(Part):
     """One number asked of every flight."""
 
     name: Name
-    kind: Literal["settling", "peak", "sample_sum"]
+    kind: MetricKind
     signal: str
-    threshold: Positive | None = Field(default=None, description="of a settling: the signal stays below it")
-    after_s: NonNegative = Field(default=0.0, description="of a peak: from this time on")
+    threshold: Positive | None = Field(default=None, description="of settling and reaching: the norm is below it")
+    norm: Literal["max", "two"] | None = Field(
+        default=None, description="max: largest magnitude, two: 2-norm; two for a sample_sum, else max"
+    )
+    after_s: NonNegative = Field(default=0.0, description="begin of the window; not of a settling")
+    until_s: Positive | None = Field(default=None, description="end of the window; not of a settling")
 
     @model_validator(mode="after")
     def _complete(self) -> MetricModel:
-        if (self.kind == "settling") != (self.threshold is not None):
-            raise ValueError("a settling, and nothing else, takes a threshold")
+        if (self.kind in ("settling", "reaching")) != (self.threshold is not None):
+            raise ValueError("settling and reaching, and nothing else, take a threshold")
+        if self.kind == "settling" and (self.after_s or self.until_s):
+            raise ValueError("a settling looks at the whole flight and takes no after_s or until_s")
+        if self.until_s is not None and self.until_s < self.after_s:
+            raise ValueError(f"until_s {self.until_s:g} is before after_s {self.after_s:g}")
         return self
+
+
+class NoiseModel(Part):
+    """How random numbers are drawn; how large each noise is stands in the craft's own tables."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63, description="the same seed gives the same flight")] = 1
+    period_s: Positive | None = Field(default=None, description="held so long; one sample period if left out")
+    truncation_sigma: Positive | None = Field(default=None, description="larger ones are cut to so many deviations")
 
 
 class MissionModel(Part):
@@ -164,8 +190,9 @@ class MissionModel(Part):
     kind: Literal["mission"]
     title: str = ""
     source: str = ""
-    funnel: FunnelModel | None = None
+    funnel: list[FunnelModel] = []
     timing: TimingModel
+    noise: NoiseModel = NoiseModel()
     metric: list[MetricModel] = []
 
     @field_validator("scheme", check_fields=False)
@@ -174,6 +201,22 @@ class MissionModel(Part):
         for item in value:
             if item.name.lower() in ("comparison", "summary"):
                 raise ValueError(f"a scheme cannot be named {item.name!r}: a file of the results is called so")
+        return value
+
+    @field_validator("funnel", mode="before")
+    @classmethod
+    def _are_tables(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            raise ValueError("there may be several funnels; write [[funnel]], not [funnel]")
+        return value
+
+    @field_validator("funnel")
+    @classmethod
+    def _signals_differ(cls, value: list[FunnelModel]) -> list[FunnelModel]:
+        signals = [funnel.signal for funnel in value]
+        for signal in signals:
+            if signals.count(signal) > 1:
+                raise ValueError(f"{signal!r} has two funnels")
         return value
 
     @field_validator("scheme", "metric", check_fields=False)

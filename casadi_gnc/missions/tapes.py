@@ -6,12 +6,14 @@
 tape      from -> to
 ========  =====================================================================================
 start     y -> m, the law's memory at the first measurement
-sense     t, x -> y
-before    t, y, good, m, force -> accepted, m, wanted, limited, lower, upper, flags
-allocate  limited, force, lower, upper -> force              (where the allocation is symbolic)
-after     t, y, m, wanted, limited, force -> m               (sampled mode)
-plant     t, x, force -> x, one Runge-Kutta step             (sampled mode)
-flow      t, x, y, m, wanted, limited, force -> x', m'       (continuous mode)
+draw      uniform -> noise, normal numbers                      (where the plant has noise)
+sense     t, x, noise -> y
+before    t, y, good, m, actuators -> accepted, m, wanted, limited, lower, upper, flags
+allocate  y, limited, actuators, lower, upper -> actuators      (where the allocation is symbolic)
+judge     y, limited, actuators -> flags
+after     t, y, m, wanted, limited, actuators -> m              (sampled mode)
+plant     t, x, actuators, noise -> x, one Runge-Kutta step     (sampled mode)
+flow      t, x, y, m, wanted, limited, actuators, noise -> x', m'     (continuous mode)
 point     s, slope, length -> s, an integrator stage         (continuous mode)
 join      s, k1, k2, k3, k4 -> s, the stages' sum            (continuous mode)
 settle    x -> x in the representation kept between steps
@@ -19,8 +21,8 @@ observe   everything of a sample -> one row of the record
 tally     row, tally -> tally, the running metrics
 ========  =====================================================================================
 
-`wanted` is the law's command, `limited` the same inside the virtual-control box, `force` what the
-actuators are told, `good` the last accepted measurement. Of these, before, allocate and after fly.
+`wanted` is the law's command, `limited` the same inside the virtual-control box, `actuators` what
+they are told, `good` the last accepted measurement. Of these, before, allocate, judge and after fly.
 """
 
 from __future__ import annotations
@@ -30,12 +32,12 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import bounds
+from casadi_gnc import bounds, noise
 from casadi_gnc.errors import FlightError
 from casadi_gnc.integrators import join, runge_kutta
 from casadi_gnc.laws import advance
 from casadi_gnc.missions import metrics
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Funnel, Mission, Scheme
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 
@@ -65,13 +67,14 @@ class Symbols:
     """Symbols of one sample; an SX each, named as the ports are."""
 
     def __init__(self, mission: Mission, scheme: Scheme) -> None:
-        plant, rows = mission.truth, scheme.actuation.effectiveness.shape[0]
+        plant, rows = mission.truth, scheme.actuation.effort.size
         self.t = ca.SX.sym("t")
         self.x = plant.state.symbol("x")
         self.y = plant.measurement.symbol("y")
         self.good = plant.measurement.symbol("good")
         self.m = scheme.law.memory.symbol("m")
-        self.force = plant.inputs.symbol("force")
+        self.actuators = plant.inputs.symbol("actuators")
+        self.noise = plant.noise.symbol("noise")
         self.wanted, self.limited = ca.SX.sym("wanted", rows), ca.SX.sym("limited", rows)
         self.lower, self.upper = plant.inputs.symbol("lower"), plant.inputs.symbol("upper")
 
@@ -121,11 +124,20 @@ def _sound_memory(law: Any, t: Any, seen: Any, m: Any) -> tuple[Any, Any]:
     return ca.if_else(sound, m, ca.SX(law.start(t, seen))), ca.logic_not(sound)
 
 
-def achieved(scheme: Scheme, limited: Any, force: Any) -> Any:
+def made(mission: Mission, scheme: Scheme, y: Any, actuators: Any) -> Any:
+    """Return the effort that the actuators make as far as the flight software knows, (R,)."""
+    return ca.mtimes(scheme.actuation.matrix(mission.truth.measurement.split(y)), actuators)
+
+
+def achieved(mission: Mission, scheme: Scheme, y: Any, limited: Any, actuators: Any) -> Any:
     """Return the effort that the law is told was made, (R,)."""
-    if scheme.feedback == "wanted":
-        return limited
-    return ca.mtimes(scheme.actuation.effectiveness, force)
+    return limited if scheme.feedback == "wanted" else made(mission, scheme, y, actuators)
+
+
+def allocated(mission: Mission, scheme: Scheme, y: Any, limited: Any, previous: Any, lower: Any, upper: Any) -> Any:
+    """Return what the actuators are told, (N,), where the allocation is an expression."""
+    matrix = scheme.actuation.matrix(mission.truth.measurement.split(y))
+    return scheme.actuation.allocator.expression(limited, previous, lower, upper, matrix)
 
 
 def before(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
@@ -147,10 +159,14 @@ def before(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
         **law.status(s.t, seen, memory),
     }
     lower, upper = ca.SX(ca.DM(actuation.lower)), ca.SX(ca.DM(actuation.upper))
+    if actuation.reach is not None:
+        # The amplitude box wins: a bound outside it becomes its edge.
+        least, most = actuation.reach(mission.truth.measurement.split(accepted))
+        lower, upper = bounds.clip(least, lower, upper), bounds.clip(most, lower, upper)
     if actuation.rate < float("inf"):
         # Clipped to the amplitude box, which wins where a previous force lies outside it.
         reach = actuation.rate * mission.timing.sample_period
-        least, most = bounds.clip(s.force - reach, lower, upper), bounds.clip(s.force + reach, lower, upper)
+        least, most = bounds.clip(s.actuators - reach, lower, upper), bounds.clip(s.actuators + reach, lower, upper)
         lower, upper = least, most
     return {
         "accepted": accepted,
@@ -163,106 +179,132 @@ def before(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
     }
 
 
+def judge(mission: Mission, scheme: Scheme, y: Any, limited: Any, actuators: Any) -> Any:
+    """Return the flags that the flight software raises once it knows what the actuators will do."""
+    actuation = scheme.actuation
+    limits = bounds.maximum(-ca.DM(actuation.limit_below), ca.DM(actuation.limit_above))
+    missing = ca.fabs(limited - made(mission, scheme, y, actuators))
+    flags = {StepStatus.EFFORT_SHORT: bounds.any_of(missing > SHORTAGE * limits)}
+    if actuation.judge is not None:
+        flags.update(actuation.judge(mission.truth.measurement.split(y), limited, actuators))
+    return sum(bit.value * flag for bit, flag in flags.items())
+
+
 def row_layout(mission: Mission, scheme: Scheme) -> Layout:
     """Return the columns of a record."""
-    rows = scheme.actuation.effectiveness.shape[0]
+    effort, truth = scheme.actuation.named, mission.truth
     return Layout(
         (
             Signal("time", 1, "s"),
-            *mission.truth.state.signals,
-            Signal("wanted", rows, "N m"),
-            Signal("limited", rows, "N m"),
-            Signal("achieved", rows, "N m"),
-            *mission.truth.inputs.signals,
+            *truth.state.signals,
+            *effort("wanted").signals,
+            *effort("limited").signals,
+            *effort("achieved").signals,
+            *truth.inputs.signals,
+            *truth.outputs.signals,
             *scheme.law.outputs.signals,
-            *_funnel_signals(mission),
+            *(signal for funnel in mission.funnels for signal in funnel_signals(mission, funnel).signals),
             *scheme.actuation.allocator.report.signals,
             Signal("status", 1),
         )
     )
 
 
-def _funnel_signals(mission: Mission) -> tuple[Signal, ...]:
-    if mission.funnel is None:
-        return ()
-    watched = mission.truth.measurement.signal(mission.funnel.signal)
-    walls = (Signal(name, watched.size, watched.unit) for name in ("funnel_lower", "funnel_upper"))
-    return (*walls, Signal("funnel_use"))
+def funnel_signals(mission: Mission, funnel: Funnel) -> Layout:
+    """Return what is recorded of a funnel: lower wall, upper wall, use; with its signal's name if there are several."""
+    watched = mission.truth.measurement.signal(funnel.signal)
+    ending = f"_{funnel.signal}" if len(mission.funnels) > 1 else ""
+    walls = (Signal(f"funnel_{name}{ending}", watched.size, watched.unit) for name in ("lower", "upper"))
+    return Layout((*walls, Signal(f"funnel_use{ending}")))
 
 
-def _watch_funnel(mission: Mission, s: Any) -> tuple[dict[str, Any], Any]:
-    """Return the walls and the use of the mission's funnel, and whether the signal has left it."""
-    if mission.funnel is None:
-        return {}, ca.SX(0)
-    funnel, watched = mission.funnel.bounds, s.y[mission.truth.measurement.place(mission.funnel.signal)]
-    lower, upper = funnel.walls(s.t)
-    shown = {"funnel_lower": lower, "funnel_upper": upper, "funnel_use": funnel.use(s.t, watched)}
-    return shown, funnel.left(s.t, watched)
+def _watch_funnels(mission: Mission, s: Any) -> tuple[dict[str, Any], Any]:
+    """Return the walls and the use of the mission's funnels, and whether a signal has left its own."""
+    shown, left = {}, ca.SX(0)
+    for funnel in mission.funnels:
+        watched = s.y[mission.truth.measurement.place(funnel.signal)]
+        values = (*funnel.bounds.walls(s.t), funnel.bounds.use(s.t, watched))
+        shown.update(zip(funnel_signals(mission, funnel).names, values, strict=True))
+        left = ca.logic_or(left, funnel.bounds.left(s.t, watched))
+    return shown, left
 
 
 def _observe(mission: Mission, scheme: Scheme, s: Any) -> ca.Function:
     """Return the tape that lays out one row of the record, status bits completed."""
-    report = scheme.actuation.allocator.report
-    flags, allocation, noted = ca.SX.sym("flags"), ca.SX.sym("allocation_flags"), report.symbol("report")
+    truth, actuation = mission.truth, scheme.actuation
+    report = actuation.allocator.report
+    flags, noted = ca.SX.sym("flags"), report.symbol("report")
     seen = law_inputs(mission, scheme, s.y)
-    made = ca.mtimes(scheme.actuation.effectiveness, s.force)
-    limits = bounds.maximum(-ca.DM(scheme.actuation.limit_below), ca.DM(scheme.actuation.limit_above))
-    short = bounds.any_of(ca.fabs(s.limited - made) > SHORTAGE * limits)
-    shown = scheme.law.show(s.t, seen, s.m)
-    diverged = ca.logic_not(bounds.all_of(ca.fabs(s.x) <= CREDIBLE))
-    flags_of_flight = StepStatus.EFFORT_SHORT.value * short + StepStatus.DIVERGED.value * diverged
-    walls, left = _watch_funnel(mission, s)
-    if StepStatus.FUNNEL_LEFT not in scheme.law.status(s.t, seen, s.m):
-        flags_of_flight += StepStatus.FUNNEL_LEFT.value * left
+    outside = {
+        StepStatus.DIVERGED: ca.logic_not(bounds.all_of(ca.fabs(s.x) <= CREDIBLE)),
+        **truth.status(s.t, s.x, s.actuators),
+    }
+    shown, left = _watch_funnels(mission, s)
+    if mission.funnels and StepStatus.FUNNEL_LEFT not in scheme.law.status(s.t, seen, s.m):
+        outside[StepStatus.FUNNEL_LEFT] = left
+    efforts = {"wanted": s.wanted, "limited": s.limited, "achieved": made(mission, scheme, s.y, s.actuators)}
+    for stage, value in efforts.items():
+        shown.update(vars(actuation.named(stage).split(value)))
     row = row_layout(mission, scheme).pack(
         time=s.t,
-        **vars(mission.truth.state.split(s.x)),
-        wanted=s.wanted,
-        limited=s.limited,
-        achieved=made,
-        **vars(mission.truth.inputs.split(s.force)),
+        **vars(truth.state.split(s.x)),
+        **vars(truth.inputs.split(s.actuators)),
+        **truth.show(s.t, s.x, s.actuators),
+        **scheme.law.show(s.t, seen, s.m),
         **shown,
-        **walls,
         **vars(report.split(noted)),
-        status=flags + allocation + flags_of_flight,
+        status=flags + sum(bit.value * flag for bit, flag in outside.items()),
     )
-    ports = {"t": s.t, "x": s.x, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited, "force": s.force}
-    return function("observe", {**ports, "flags": flags, "allocation_flags": allocation, "report": noted}, {"row": row})
+    ports = {"t": s.t, "x": s.x, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited}
+    return function("observe", {**ports, "actuators": s.actuators, "flags": flags, "report": noted}, {"row": row})
 
 
 def build(mission: Mission, scheme: Scheme) -> Tapes:
     """Return all tapes of a scheme in the mission's mode."""
     s, plant, law, timing = Symbols(mission, scheme), mission.truth, scheme.law, mission.timing
-    loop = {"t": s.t, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited, "force": s.force}
-    told = achieved(scheme, s.limited, s.force)
+    loop = {"t": s.t, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited, "actuators": s.actuators}
+    told = achieved(mission, scheme, s.y, s.limited, s.actuators)
     seen = law_inputs(mission, scheme, s.y)
+    before_ports = {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "actuators": s.actuators}
     tapes = {
-        "sense": function("sense", {"t": s.t, "x": s.x}, {"y": plant.measure(s.t, s.x)}),
-        "before": function(
-            "before", {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "force": s.force}, before(mission, scheme, s)
+        "sense": function("sense", {"t": s.t, "x": s.x, "noise": s.noise}, {"y": plant.measure(s.t, s.x, s.noise)}),
+        "before": function("before", before_ports, before(mission, scheme, s)),
+        "judge": function(
+            "judge",
+            {"y": s.y, "limited": s.limited, "actuators": s.actuators},
+            {"flags": judge(mission, scheme, s.y, s.limited, s.actuators)},
         ),
         "settle": function("settle", {"x": s.x}, {"settled": plant.settle(s.x)}),
         "observe": _observe(mission, scheme, s),
     }
+    if plant.noise.size:
+        uniform = ca.SX.sym("uniform", noise.uniform_count(plant.noise.size))
+        drawn = noise.normals(uniform, plant.noise.size, mission.noise.truncation)
+        tapes["draw"] = function("draw", {"uniform": uniform}, {"noise": drawn})
     if scheme.actuation.is_symbolic:
-        forces = scheme.actuation.allocator.expression(s.limited, s.force, s.lower, s.upper)
-        ports = {"limited": s.limited, "force": s.force, "lower": s.lower, "upper": s.upper}
-        tapes["allocate"] = function("allocate", ports, {"allocated": forces})
+        answer = allocated(mission, scheme, s.y, s.limited, s.actuators, s.lower, s.upper)
+        ports = {"y": s.y, "limited": s.limited, "actuators": s.actuators, "lower": s.lower, "upper": s.upper}
+        tapes["allocate"] = function("allocate", ports, {"allocated": answer})
     if timing.mode == "sampled":
         tapes["after"] = function("after", loop, {"memory": advance(law, s.t, seen, s.m, s.wanted, told)})
-        stepped = runge_kutta(lambda t, x: plant.rate(t, x, s.force), s.t, s.x, timing.sample_period / timing.substeps)
-        tapes["plant"] = function("plant", {"t": s.t, "x": s.x, "force": s.force}, {"stepped": stepped})
+        ports = {"t": s.t, "x": s.x, "actuators": s.actuators, "noise": s.noise}
+        tapes["plant"] = function("plant", ports, {"stepped": plant_step(mission, s.t, s.x, s.actuators, s.noise)})
     else:
-        slope = ca.vertcat(plant.rate(s.t, s.x, s.force), law.rate(s.t, seen, s.m, s.wanted, told))
-        tapes["flow"] = function(
-            "flow", {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}}, {"slope": slope}
-        )
+        slope = ca.vertcat(plant.rate(s.t, s.x, s.actuators, s.noise), law.rate(s.t, seen, s.m, s.wanted, told))
+        ports = {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}, "noise": s.noise}
+        tapes["flow"] = function("flow", ports, {"slope": slope})
         tapes.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
     row = row_layout(mission, scheme)
     tally, fold = metrics.fold(mission.metrics, row)
     tapes["tally"] = fold
     tapes["start"] = function("start", {"y": s.y}, {"m": law.start(ca.SX(0), seen)})
     return Tapes(tapes, row, tally, scheme.actuation.is_symbolic)
+
+
+def plant_step(mission: Mission, t: Any, x: Any, actuators: Any, noise_: Any) -> Any:
+    """Return x one substep later, by one Runge-Kutta step under held actuators and noise."""
+    step = mission.timing.sample_period / mission.timing.substeps
+    return runge_kutta(lambda at, state: mission.truth.rate(at, state, actuators, noise_), t, x, step)
 
 
 def _integrator(size: int, h: float) -> dict[str, ca.Function]:

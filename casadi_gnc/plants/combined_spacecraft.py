@@ -25,6 +25,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc import attitude
+from casadi_gnc.plants._plant import Plant
 from casadi_gnc.plants.environment import HarmonicTorque
 from casadi_gnc.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
@@ -33,7 +34,7 @@ FRAME = "combined body"
 
 
 @dataclass(frozen=True, eq=False)
-class CombinedSpacecraft:
+class CombinedSpacecraft(Plant):
     """Simulate the combined spacecraft.
 
     Parameters
@@ -66,18 +67,14 @@ class CombinedSpacecraft:
         """Thruster forces."""
         return Layout((Signal("force", self.effectiveness.shape[1], "N"),))
 
-    def measure(self, t: Any, x: Any) -> Any:
-        """Return what the sensors say at time t [s]: the state itself."""
-        return x
-
     def torque(self, force: Any) -> Any:
         """Return the torque that the thrusters really make, A_c F, (3,), [N m]."""
         return ca.mtimes(self.effectiveness, force)
 
-    def rate(self, t: Any, x: Any, force: Any) -> Any:
+    def rate(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
         """Return x' (eqs 1 and 14)."""
         now = self.state.split(x)
-        torque = self.torque(force) + self.disturbance.torque(t)
+        torque = self.torque(actuators) + self.disturbance.torque(t)
         return self.state.pack(
             mrp=attitude.mrp_rate(now.mrp, now.rate),
             rate=self.body.acceleration(now.mrp, now.rate, torque),

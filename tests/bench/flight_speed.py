@@ -55,7 +55,7 @@ def compiled(maths: str) -> Callable[[], np.ndarray]:
     fresh = begin(MISSION, built, engine)
 
     def begin_copy():
-        return type(fresh)(*(getattr(fresh, name).copy() for name in ("x", "m", "force", "good", "tally")))
+        return type(fresh)(*(getattr(fresh, name).copy() for name in ("x", "m", "actuators", "good", "tally")))
 
     return run
 

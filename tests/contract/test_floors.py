@@ -13,24 +13,9 @@ import pytest
 import casadi_gnc
 
 ROOT = Path(casadi_gnc.__file__).parent
+#: Single modules at the top are the ground, floor 0.
 FLOORS = {
-    **dict.fromkeys(
-        (
-            "errors",
-            "status",
-            "exact",
-            "assets",
-            "compilers",
-            "files",
-            "integrators",
-            "signals",
-            "bounds",
-            "attitude",
-            "rigid_body",
-            "thrusters",
-        ),
-        0,
-    ),
+    **{path.stem: 0 for path in ROOT.glob("*.py")},
     **dict.fromkeys(("plants", "laws", "allocation", "synthesis"), 1),
     "embedded": 2,
     "missions": 3,

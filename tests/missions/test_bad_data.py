@@ -28,13 +28,13 @@ def test_fuzzed_measurements_leave_bounded_forces_and_recovery(problem, scheme, 
     step = mission.step(scheme)
     size = step.numel_in("y")
     calm = np.zeros(size)
-    state = {"good": calm, "m": np.zeros(step.numel_in("m")), "force": np.zeros(12)}
+    state = {"good": calm, "m": np.zeros(step.numel_in("m")), "actuators": np.zeros(12)}
     for k in range(2000):
         y = rng.uniform(-0.5, 0.5, size)
         if k % 3 == 0:
             y[rng.integers(size)] = rng.choice(STRANGE)
         found = step(t=0.1 * k, y=y, **state)
-        force = np.array(found["force_next"])
+        force = np.array(found["actuators_next"])
         assert np.all((force >= 0) & (force <= 3.75e-3)), k
         state = {name: np.array(found[f"{name}_next"]).ravel() for name in state}
     for k in range(50):
@@ -55,7 +55,7 @@ def test_corrupt_memory_is_started_afresh(problem, scheme):
     for value in (np.nan, np.inf, -1e300):
         m = np.zeros(fresh.memory.size)
         m[-1] = value
-        found = step(t=0.0, y=y, good=y, m=m, force=force)
+        found = step(t=0.0, y=y, good=y, m=m, actuators=force)
         assert int(found["status"]) & StepStatus.MEMORY_RESET
         assert np.all(np.isfinite(np.array(found["m_next"])))
         assert np.all(np.isfinite(np.array(found["wanted"])))
@@ -65,7 +65,7 @@ def test_lost_time_and_lost_measurements_command_nothing_wild():
     step = casadi_gnc.load("huang2020/slew").step("funnel_pinv")
     nothing = np.full(6, np.nan)
     for t, y, good in ((np.nan, np.zeros(6), np.zeros(6)), (0.0, nothing, nothing)):
-        found = step(t=t, y=y, good=good, m=np.zeros(9), force=np.zeros(12))
+        found = step(t=t, y=y, good=good, m=np.zeros(9), actuators=np.zeros(12))
         assert np.all(np.isfinite(np.array(found["wanted"])))
         assert np.all(np.isfinite(np.array(found["limited"])))
         assert int(found["status"]) & (StepStatus.COMMAND_REPLACED | StepStatus.MEASUREMENT_REPLACED)

@@ -75,7 +75,7 @@ def test_default_slew_stays_in_its_funnel():
     assert flight.time[-1] == pytest.approx(1000)
     assert np.all(flight["mrp"] > flight["funnel_lower"])
     assert np.all(flight["mrp"] < flight["funnel_upper"])
-    floor = np.array(mission.funnel.bounds.floor).ravel()
+    floor = np.array(mission.funnels[0].bounds.floor).ravel()
     assert np.all(floor >= 5e-5)
     # Without the limiters the same funnel is left.
     unlimited = casadi_gnc.fly(mission.with_scheme("funnel_robust", max_acceleration=None).with_timing(duration=60.0))

@@ -21,11 +21,11 @@ def test_closed_loop_repeats_the_flight(detumble):
 
 
 def test_ports_are_named(detumble):
-    assert detumble.plant().name_in() == ["t", "x", "force"]
+    assert detumble.plant().name_in() == ["t", "x", "actuators"]
     assert detumble.law("observer_pinv").name_out() == ["wanted", "memory_rate", "disturbance_estimate"]
     step = detumble.step("observer_pinv")
-    assert step.name_in() == ["t", "y", "good", "m", "force"]
-    assert step.name_out() == ["force_next", "m_next", "good_next", "wanted", "limited", "status"]
+    assert step.name_in() == ["t", "y", "good", "m", "actuators"]
+    assert step.name_out() == ["actuators_next", "m_next", "good_next", "wanted", "limited", "status"]
 
 
 def test_linearised_loop_has_the_designed_poles(detumble):

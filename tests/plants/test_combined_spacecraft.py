@@ -18,7 +18,7 @@ def free_body(**changes) -> CombinedSpacecraft:
 
 def fly(plant: CombinedSpacecraft, h: float, duration: float) -> np.ndarray:
     t, x = ca.SX.sym("t"), plant.state.symbol("x")
-    stepped = plant.settle(runge_kutta(lambda t, x: plant.rate(t, x, ca.DM.zeros(12)), t, x, h))
+    stepped = plant.settle(runge_kutta(lambda t, x: plant.rate(t, x, ca.DM.zeros(12), ca.DM(0, 1)), t, x, h))
     step = ca.Function("step", [x, t], [stepped])
     count = round(duration / h)
     return np.array(step.mapaccum(count)(START, ca.DM(np.arange(count) * h).T))[:, -1]

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from casadi_gnc.missions.mission import Actuation, Plant
+from casadi_gnc.missions.mission import Actuation, Panel
+from casadi_gnc.plants import Plant
 
 #: Path of a key in the file -> "file, line n, key", for messages.
 Where = Callable[[tuple[str | int, ...]], str]
@@ -28,8 +29,10 @@ class Craft:
     plant : the truth.
     start : its state at t = 0.
     start_keys : key of the file, in [initial], that gives each measured signal.
-    believed : what the flight software believes; given to laws as `body`.
+    believed : what the flight software believes; given to laws that have a `body`.
     actuation : makes the actuation of a scheme from the scheme's table.
+    panels : what a flight's picture shows.
+    notes : sentences that a reader of every flight must see.
     """
 
     plant: Plant
@@ -37,6 +40,8 @@ class Craft:
     start_keys: dict[str, str]
     believed: Any
     actuation: Callable[[Any], Actuation]
+    panels: tuple[Panel, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 #: Modules by the name that `spacecraft.model` gives.

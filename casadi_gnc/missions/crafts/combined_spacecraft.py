@@ -16,7 +16,7 @@ from casadi_gnc.allocation import AllocationProblem, OnlineInFlight, PseudoInver
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions import matrices
 from casadi_gnc.missions.crafts import Craft, Where
-from casadi_gnc.missions.mission import Actuation
+from casadi_gnc.missions.mission import Actuation, Panel
 from casadi_gnc.missions.schema import (
     Matrix,
     MissionModel,
@@ -27,6 +27,7 @@ from casadi_gnc.missions.schema import (
     Rows,
     SchemeModel,
     Vector,
+    law_tables,
     orientation,
 )
 from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
@@ -168,9 +169,14 @@ class RobustModel(Part):
     change_weight: NonNegative = Field(default=1.0, description="diagonal of M2")
 
 
+_Laws = law_tables("rate_damping", "attitude_pd", "detumble", "prescribed_performance")
+
+
 class Scheme(SchemeModel):
     """A scheme of this craft."""
 
+    torque_limit_N_m: Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    law: _Laws  # type: ignore[valid-type]
     allocation: Annotated[PinvModel | RobustModel, Field(discriminator="method")]
 
 
@@ -252,6 +258,11 @@ def build(model: MissionFile, where: Where) -> Craft:
         start_keys={"mrp": "mrp", "rate": "rate_rad_per_s"},
         believed=body,
         actuation=lambda scheme: _actuation(scheme, craft.thrusters, thought),
+        panels=(
+            Panel("tracked", "mrp", "attitude MRP") if model.funnel else Panel("tracked", "rate", "rate"),
+            Panel("effort", "torque", "torque", 1e3, "mN m"),
+            Panel("actuators", "force", "force, thruster no.", 1e3, "mN"),
+        ),
     )
 
 
@@ -270,7 +281,7 @@ def _actuation(scheme: Scheme, thrusters: Thrusters, thought: _View) -> Actuatio
 
 def _allocator(model: Any, thrusters: Thrusters, thought: _View) -> Any:
     if isinstance(model, PinvModel):
-        return PseudoInverse(thought.thrusters.effectiveness)
+        return PseudoInverse()
     half = model.centre_of_mass_error_m
     problem = AllocationProblem.of_thrusters(
         thought.thrusters,
