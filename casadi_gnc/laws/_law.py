@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import casadi as ca
 
 from casadi_gnc import exact
+from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
@@ -104,6 +106,10 @@ class Law:
 
     def check_hold(self) -> None:
         """Raise `LawError` if the law cannot work at its sample period; say which one it could keep."""
+
+    def checks(self) -> Iterable[Check]:
+        """Return what can be said of the gains alone: the conditions of the source's theorems."""
+        return ()
 
     def start(self, t: Any, y: Any) -> Any:
         """Return the memory at the first measurement y: every estimate is zero."""

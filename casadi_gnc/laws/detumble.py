@@ -26,11 +26,14 @@ Source: Huang, Biggs, Duan (2020), section 3.1, doi:10.1016/j.ast.2019.105572. T
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
+from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
@@ -62,6 +65,14 @@ class Detumble(Law):
     def compensator(self) -> SaturationCompensator:
         """The saturation compensator."""
         return SaturationCompensator(self.compensator_decay)
+
+    def checks(self) -> Iterator[Check]:
+        """Yield the two conditions of Theorem 2."""
+        theorem = "Huang, Biggs, Duan (2020), Theorem 2"
+        strength = float(np.linalg.norm(np.array(self.body.inverse_inertia), 2)) * float(self.compensator_gain)
+        damping, decay = float(self.rate_gain), float(self.compensator_decay)
+        yield sufficient("gains.theorem2.compensation", 8 * damping * decay, 15 * strength**2, "1/s^2", theorem)
+        yield sufficient("gains.theorem2.observer", 8 * damping * float(self.observer_gain), 15.0, "1/s^2", theorem)
 
     def known(self, rate: Any) -> Any:
         """Return A, (3,), [rad/s^2]: the modelled acceleration, gravity gradient left out."""

@@ -37,12 +37,15 @@ Source: Huang, Biggs, Duan (2020), section 3, doi:10.1016/j.ast.2019.105572.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from casadi_gnc import attitude
+from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.braking_limiter import BrakingLimiter
 from casadi_gnc.laws.command_filter import CommandFilter
@@ -99,6 +102,19 @@ class PrescribedPerformance(Law):
     def filter(self) -> CommandFilter:
         """The filter of the rate command."""
         return CommandFilter(self.filter_time_constant, self.max_acceleration)
+
+    def checks(self) -> Iterator[Check]:
+        """Yield the three conditions of Theorem 1; the third where it is easiest, at zero attitude in the end."""
+        theorem = "Huang, Biggs, Duan (2020), Theorem 1"
+        strength = float(np.linalg.norm(np.array(self.body.inverse_inertia), 2)) * float(self.compensator_gain)
+        damping, decay = float(self.rate_gain), float(self.compensator_decay)
+        floor = float(np.array(ca.DM(self.funnel.floor)).min())
+        slope = float(np.max(1 / np.array(ca.DM(self.funnel.spread(ca.DM(np.inf), ca.DM.zeros(3))))))
+        yield sufficient("gains.theorem1.compensation", 2 * decay * damping, 3 * strength**2, "1/s^2", theorem)
+        yield sufficient("gains.theorem1.observer", 2 * float(self.observer_gain) * damping, 3.0, "1/s^2", theorem)
+        limit = 3 * slope**2 * float(self.filter_time_constant)
+        told = f"{theorem}, funnel at its floor of {floor:g}"
+        yield sufficient("gains.theorem1.filter", 16 * float(self.attitude_gain), limit, "-", told)
 
     def target_rate(self, t: Any, mrp: Any) -> Any:
         """Return x2bar, (3,), [rad/s], the rate that shrinks the transformed error (eq. 31)."""

@@ -19,28 +19,33 @@ from casadi_gnc.missions.mission import Funnel, Metric, Mission, Noise, Scheme, 
 from casadi_gnc.missions.toml_place import describe
 
 
-def build(model: Any, path: Path, text: str) -> Mission:
+def build(model: Any, path: Path, text: str, *, strict: bool = True) -> Mission:
     """Return the mission that a checked file describes; path and text serve messages.
 
     Parameters
     ----------
     model : the `MissionFile` of a craft.
+    strict : refuse a sample time that a law cannot bear.
     """
     where = partial(describe, path, text)
     craft: Craft = crafts.module(model.spacecraft.model).build(model, where)
     _check_start(craft, where)
     funnels = tuple(_funnel(table, i, craft, where) for i, table in enumerate(model.funnel))
     given = model.timing
-    timing = Timing(given.mode, given.sample_period_s, given.duration_s, given.plant_substeps)
+    kept = round((given.record_period_s or given.sample_period_s) / given.sample_period_s)
+    timing = Timing(given.mode, given.sample_period_s, given.duration_s, given.plant_substeps, kept)
     mission = Mission(
         name=path.stem,
         truth=craft.plant,
         start=craft.start,
         timing=timing,
-        schemes=tuple(_scheme(scheme, i, craft, funnels, timing, where) for i, scheme in enumerate(model.scheme)),
+        schemes=tuple(_scheme(scheme, i, craft, funnels, timing, where, strict) for i, scheme in enumerate(model.scheme)),
         funnels=funnels,
         noise=_noise(model.noise, timing, where),
         panels=craft.panels,
+        target=craft.target,
+        checks=craft.checks,
+        truths=craft.truths,
         notes=craft.notes,
         title=model.title,
         source=model.source,
@@ -127,6 +132,7 @@ def _scheme(
     funnels: tuple[Funnel, ...],
     timing: Timing,
     where: Where,
+    strict: bool,
 ) -> Scheme:
     table: Any = model.law
     law: Any = LAWS[table.type]
@@ -150,6 +156,8 @@ def _scheme(
         gains["body"] = craft.believed
     try:
         made = law(hold=hold, printed=frozenset(named), **gains)
+        if strict:
+            made.check_hold()
         return Scheme(model.name, made, craft.actuation(model), model.feedback, model.title)
     except LawError as error:
         raise ProblemError(str(error), where(("scheme", index, "law"))) from None

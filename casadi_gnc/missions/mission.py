@@ -5,12 +5,13 @@ schemes that could fly it.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import casadi as ca
 
+from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.plants import Plant
@@ -32,17 +33,19 @@ class Timing:
     sample_period : [s].
     duration : [s].
     substeps : Runge-Kutta steps of the plant in one sample period.
+    record_every : one sample of so many is kept.
     """
 
     mode: Mode
     sample_period: float
     duration: float
     substeps: int = 1
+    record_every: int = 1
 
     def __post_init__(self) -> None:
         if self.mode not in ("sampled", "continuous"):
             raise FlightError(f"mode is {self.mode!r}, expected 'sampled' or 'continuous'")
-        for name in ("sample_period", "duration", "substeps"):
+        for name in ("sample_period", "duration", "substeps", "record_every"):
             value = getattr(self, name)
             if not (value > 0 and value < float("inf")):
                 raise FlightError(f"{name} is {value}, expected a positive number")
@@ -87,6 +90,8 @@ class Actuation:
     effort : what the actuators make together, one signal a kind; R rows.
     reach : function of the measured signals that returns further bounds, lower and upper, (N,) each.
     judge : function (measured signals, limited effort, actuators) -> flags by status bit, on board.
+    inverse : function (measured signals, limited effort) -> actuators, (N,), that a craft knows better
+        than an allocator could: the allocator is then given this in the place of the effort.
     """
 
     effectiveness: ca.DM | Callable[[Any], Any]
@@ -99,6 +104,7 @@ class Actuation:
     effort: Layout = TORQUE
     reach: Callable[[Any], tuple[Any, Any]] | None = None
     judge: Callable[[Any, Any, Any], dict[StepStatus, Any]] | None = None
+    inverse: Callable[[Any, Any], Any] | None = None
 
     def matrix(self, seen: Any) -> Any:
         """Return the believed effectiveness, (R, N), at the measured signals `seen`."""
@@ -133,7 +139,6 @@ class Scheme:
     def __post_init__(self) -> None:
         if self.feedback not in ("achieved", "wanted"):
             raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
-        self.law.check_hold()
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +190,9 @@ class Mission:
     """Everything needed to fly; made by `casadi_gnc.load`, changed by `with_timing`, `with_scheme`.
 
     `casadi.Function`s for analysis come from `plant`, `law`, `step` and `closed_loop`. `notes` are
-    what a reader of every flight must know, e.g. that an orbit is no orbit.
+    what a reader of every flight must know, e.g. that an orbit is no orbit. `target` gives the states that
+    the laws regulate, by name, and the values that they bring them to; `checks` are the craft's own, and `truths` names
+    the effectivenesses, (R, N), that errors and faults may make true.
     """
 
     name: str
@@ -197,6 +204,9 @@ class Mission:
     funnels: tuple[Funnel, ...] = ()
     noise: Noise = Noise()
     panels: tuple[Panel, ...] = ()
+    target: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    checks: Callable[[Mission, Scheme], Iterable[Check]] = lambda mission, scheme: ()
+    truths: Callable[[Mission, Scheme], Mapping[str, Any]] = lambda mission, scheme: {}
     notes: tuple[str, ...] = ()
     title: str = ""
     source: str = ""
@@ -213,17 +223,22 @@ class Mission:
         raise FlightError(f"no scheme {name!r} in {self.name}; there is {known}")
 
     def with_timing(self, **changes: Any) -> Mission:
-        """Return the mission with another `mode`, `sample_period`, `duration` or `substeps`."""
+        """Return the mission with another `mode`, `sample_period`, `duration` or `substeps`.
+
+        Raises `LawError` where a law cannot work at that sample period.
+        """
         timing = replace(self.timing, **changes)
         hold = timing.sample_period if timing.mode == "sampled" else 0.0
         schemes = tuple(replace(scheme, law=replace(scheme.law, hold=hold)) for scheme in self.schemes)
+        for scheme in schemes:
+            scheme.law.check_hold()
         return replace(self, timing=timing, schemes=schemes)
 
     def with_scheme(self, name: str | None = None, **changes: Any) -> Mission:
         """Return the mission with one scheme only, changed: `feedback`, or gains of its law by name."""
         scheme = self.scheme(name)
         own = {key: changes.pop(key) for key in ("feedback", "actuation", "title") if key in changes}
-        known = {field.name for field in dataclasses.fields(scheme.law)}
+        known = {own_field.name for own_field in dataclasses.fields(scheme.law)}
         for key in changes:
             if key not in known:
                 raise FlightError(f"scheme {scheme.name!r} has no {key!r}; its law has {', '.join(sorted(known))}")

@@ -133,6 +133,7 @@ class Harmonic(Part):
 
     frequency_rad_per_s: Positive
     amplitude_N_m: Vector
+    phase_rad: float = Field(default=0.0, description="at t = 0; pi/2 for a cosine")
 
 
 class Environment(Part):
@@ -141,6 +142,15 @@ class Environment(Part):
     orbit_rate_rad_per_s: NonNegative = 0.0
     constant_torque_N_m: Vector = [0.0, 0.0, 0.0]
     harmonic: list[Harmonic] = []
+
+    def disturbance(self) -> HarmonicTorque:
+        """Return the torque that acts besides gravity."""
+        return HarmonicTorque(
+            tuple(self.constant_torque_N_m),
+            tuple(harmonic.frequency_rad_per_s for harmonic in self.harmonic),
+            tuple(tuple(harmonic.amplitude_N_m) for harmonic in self.harmonic),
+            tuple(harmonic.phase_rad for harmonic in self.harmonic),
+        )
 
 
 class Initial(Part):
@@ -228,11 +238,7 @@ def build(model: MissionFile, where: Where) -> Craft:
     plant = CombinedSpacecraft(
         RigidBody(true_inertia, tuple(real.engine_torque), environment.orbit_rate_rad_per_s),
         real.thrusters.effectiveness,
-        HarmonicTorque(
-            tuple(environment.constant_torque_N_m),
-            tuple(harmonic.frequency_rad_per_s for harmonic in environment.harmonic),
-            tuple(tuple(harmonic.amplitude_N_m) for harmonic in environment.harmonic),
-        ),
+        environment.disturbance(),
         craft.rate_limit_rad_per_s,
     )
     believed = model.believed
@@ -258,6 +264,7 @@ def build(model: MissionFile, where: Where) -> Craft:
         start_keys={"mrp": "mrp", "rate": "rate_rad_per_s"},
         believed=body,
         actuation=lambda scheme: _actuation(scheme, craft.thrusters, thought),
+        target={"mrp": [0.0] * 3, "rate": [0.0] * 3} if model.funnel else {"rate": [0.0] * 3},
         panels=(
             Panel("tracked", "mrp", "attitude MRP") if model.funnel else Panel("tracked", "rate", "rate"),
             Panel("effort", "torque", "torque", 1e3, "mN m"),

@@ -1,0 +1,71 @@
+"""`casadi-gnc check`: what would go wrong, told before the flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from casadi_gnc.checks import Check
+
+
+def check(
+    problem: Annotated[str, typer.Argument(help="A mission or synthesis file, or the name of a shipped one.")],
+    scheme: Annotated[list[str] | None, typer.Option(help="Only this scheme; may be repeated.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the margins into this file (.png or .svg).")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
+) -> None:
+    """Check a problem without flying it; exit code 1 if any check fails."""
+    from casadi_gnc.checks import worst
+    from casadi_gnc.missions.checking import check_file
+
+    title, found = check_file(problem, scheme)
+    if plot is not None:
+        from casadi_gnc.missions.checking.picture import draw
+
+        draw(title, found, plot)
+    if json:
+        _print_json(title, found)
+    else:
+        _print(title, found, plot)
+    if worst(found) == "fail":
+        raise typer.Exit(1)
+
+
+def _print_json(title: str, found: list[Check]) -> None:
+    import json as encoder
+
+    from casadi_gnc.missions.checking import as_data
+
+    typer.echo(encoder.dumps({"problem": title, "checks": as_data(found)}, indent=2, allow_nan=False))
+
+
+def _print(title: str, found: list[Check], plot: Path | None) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console(soft_wrap=True)
+    table = Table(title=escape(title))
+    for name, justify in (("check", "left"), ("scheme", "left"), ("value", "right"), ("limit", "right"), ("", "left")):
+        table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    colours = {"ok": "green", "note": "cyan", "warn": "yellow", "fail": "red"}
+    for one in found:
+        limit = f"{'>=' if one.at_least else '<='} {one.limit:.4g} {one.unit.replace('-', '')}".rstrip()
+        verdict = f"[{colours[one.verdict]}]{one.verdict}[/]"
+        table.add_row(one.name, escape(one.scheme), f"{one.value:.4g}", limit, verdict)
+    console.print(table, soft_wrap=False)
+    told: dict[tuple[str, ...], list[str]] = {}
+    for one in found:
+        if one.verdict != "ok":
+            told.setdefault((one.verdict, one.name, one.consequence, one.remedy, one.source), []).append(one.scheme)
+    for (verdict, name, consequence, remedy, source), schemes in told.items():
+        whom = f" ({', '.join(dict.fromkeys(s for s in schemes if s))})" if any(schemes) else ""
+        sentence = f"{verdict}: {name}{whom}: {consequence} {remedy}" + (f" [{source}]" if source else "")
+        console.print(sentence, highlight=False, markup=False)
+    counts = {verdict: sum(one.verdict == verdict for one in found) for verdict in ("ok", "note", "warn", "fail")}
+    console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()), highlight=False)
+    if plot is not None:
+        console.print(f"wrote {plot}", highlight=False, markup=False)

@@ -1,0 +1,163 @@
+"""The closed loop, linearised at its target with actuators that do what they are told.
+
+What a craft regulates (`Mission.target`) and the law's memory are the state; everything else of the
+plant stays as at the start. Sampled, one step of the map is one sample period; continuous, the
+slope is that of plant and law together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from scipy import linalg
+
+from casadi_gnc.laws import advance
+from casadi_gnc.missions import tapes
+from casadi_gnc.missions.mission import Mission, Scheme
+
+
+def rows_of(mission: Mission) -> list[int]:
+    """Return the rows of the plant's state that the laws regulate."""
+    return [row for name in mission.target for row in _rows(mission.truth.state.place(name))]
+
+
+def _rows(place: slice) -> range:
+    return range(place.start, place.stop)
+
+
+def target_state(mission: Mission) -> np.ndarray:
+    """Return the plant's state at the target: what is regulated there, the rest as at the start."""
+    x = np.array(mission.start, dtype=float)
+    for name, values in mission.target.items():
+        x[mission.truth.state.place(name)] = values
+    return x
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLoop:
+    """Linearise the loop of one scheme at time `t` [s]."""
+
+    mission: Mission
+    scheme: Scheme
+    t: float
+
+    @property
+    def sampled(self) -> bool:
+        """Whether `matrix` is a map from sample to sample; else it is a slope [1/s]."""
+        return self.mission.timing.mode == "sampled"
+
+    @cached_property
+    def matrix(self) -> np.ndarray:
+        """The Jacobian over what is regulated, then the memory."""
+        return self._jacobians[0]
+
+    @cached_property
+    def memory_when_saturated(self) -> np.ndarray:
+        """The Jacobian of the memory alone while measurement and achieved effort stand still."""
+        return self._jacobians[1]
+
+    @cached_property
+    def delayed(self) -> np.ndarray:
+        """The sampled map with one more sample period between measurement and actuators."""
+        a, b, c, d = self._jacobians[2:]
+        # State: (regulated, memory, actuators still on their way); these act on the plant now.
+        n, k = a.shape[0], b.shape[1]
+        top = np.hstack([a, b])
+        return np.vstack([top, np.hstack([c, d])]) if n + k else np.zeros((0, 0))
+
+    @cached_property
+    def _parts(self) -> tuple[tapes.Symbols, tuple[Any, ...]]:
+        """The plant moved by late actuators, the memory moved by what it is told, actuators, their effort, told."""
+        mission, law = self.mission, self.scheme.law
+        s = tapes.Symbols(mission, self.scheme)
+        quiet = ca.DM.zeros(mission.truth.noise.size)
+        y = mission.truth.measure(s.t, s.x, quiet)
+        seen = tapes.law_inputs(mission, self.scheme, y)
+        wanted = law.command(s.t, seen, s.m)
+        actuators = self.unlimited(y, wanted)
+        told = ca.SX.sym("told", wanted.numel())
+        if self.sampled:
+            x, h = s.x, mission.timing.sample_period / mission.timing.substeps
+            for i in range(mission.timing.substeps):
+                x = tapes.plant_step(mission, s.t + i * h, x, s.actuators, quiet)
+            later = advance(law, s.t, seen, s.m, wanted, told)
+        else:
+            x = mission.truth.rate(s.t, s.x, s.actuators, quiet)
+            later = law.rate(s.t, seen, s.m, wanted, told)
+        made = tapes.made(mission, self.scheme, y, actuators)
+        return s, (x, later, actuators, made, told)
+
+    @cached_property
+    def _closed(self) -> ca.Function:
+        """The loop as a function of (t, x, m): regulated states and memory moved, or their rates."""
+        s, (x, later, actuators, made, told) = self._parts
+        moved = ca.substitute(x, s.actuators, actuators)[rows_of(self.mission)]
+        return ca.Function("closed", [s.t, s.x, s.m], [ca.vertcat(moved, ca.substitute(later, told, made))])
+
+    @cached_property
+    def _jacobians(self) -> tuple[np.ndarray, ...]:
+        mission = self.mission
+        s, (x, later, actuators, made, told) = self._parts
+        rows, memory, late = rows_of(mission), s.m.numel(), s.actuators
+        state = ca.vertcat(s.x[rows], s.m)
+        closed = ca.vertcat(ca.substitute(x, late, actuators)[rows], ca.substitute(later, told, made))
+        # With a sample of delay the actuators are a state: the plant feels the old, the law sets the new.
+        waiting = ca.vertcat(x[rows], ca.substitute(later, told, made))
+        everything = [
+            ca.jacobian(closed, state),
+            ca.jacobian(later, s.m) if memory else ca.SX(0, 0),
+            ca.jacobian(waiting, state),
+            ca.jacobian(waiting, late),
+            ca.jacobian(actuators, state),
+            ca.jacobian(actuators, late),
+        ]
+        point = ca.Function("jacobians", [s.t, s.x, s.m, told, late], everything)
+        x0, m0 = self.target
+        found: Any = point(self.t, x0, m0, np.zeros(told.numel()), np.zeros(late.numel()))
+        return tuple(np.array(ca.DM(each).full()) for each in found)
+
+    @cached_property
+    def target(self) -> tuple[np.ndarray, np.ndarray]:
+        """The plant's state at the target, and the memory that a law starts with there."""
+        mission, law = self.mission, self.scheme.law
+        quiet = ca.DM.zeros(mission.truth.noise.size)
+        x0 = target_state(mission)
+        y0 = ca.DM(mission.truth.measure(self.t, ca.DM(x0), quiet))
+        m0 = ca.DM(law.start(ca.DM(self.t), tapes.law_inputs(mission, self.scheme, y0)))
+        return x0, np.array(m0).ravel()
+
+    def pushed(self, samples: int) -> np.ndarray:
+        """Return where what depends on time drives the loop from its target: regulated states, (samples, n)."""
+        mission, rows = self.mission, rows_of(self.mission)
+        x0, m0 = self.target
+        h = mission.timing.duration / samples
+        times = np.arange(samples) * h
+        moved = np.array(self._closed.map(samples)(times + (0 if self.sampled else h / 2), ca.DM(x0), ca.DM(m0))).T
+        size = self.matrix.shape[0]
+        if self.sampled:
+            step, push = self.matrix, moved - np.concatenate([x0[rows], m0])
+        else:
+            # exp of [[A, I], [0, 0]] h holds the exact step and the exact effect of a held push.
+            joint = linalg.expm(h * np.block([[self.matrix, np.eye(size)], [np.zeros((size, 2 * size))]]))
+            step, push = joint[:size, :size], moved @ joint[:size, size:].T
+        state, path = np.zeros(size), np.zeros((samples, len(rows)))
+        for k in range(samples):
+            path[k] = state[: len(rows)]
+            state = step @ state + push[k]
+        return path
+
+    def unlimited(self, y: Any, wanted: Any) -> Any:
+        """Return the least actuator commands that make the wanted effort, bounds left out."""
+        matrix = self.scheme.actuation.matrix(self.mission.truth.measurement.split(y))
+        return ca.mtimes(matrix.T, ca.solve(ca.mtimes(matrix, matrix.T), wanted))
+
+
+def spectral_radius(matrix: np.ndarray) -> float:
+    """Return the largest magnitude of an eigenvalue; 0 for an empty matrix, NaN where it has no number."""
+    if not matrix.size:
+        return 0.0
+    return float(np.abs(np.linalg.eigvals(matrix)).max()) if np.isfinite(matrix).all() else float("nan")

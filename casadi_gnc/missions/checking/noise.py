@@ -1,0 +1,81 @@
+"""How much of the actuators goes into measurement noise?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.checks import Check
+from casadi_gnc.missions import tapes
+from casadi_gnc.missions.checking.linear import target_state
+from casadi_gnc.missions.mission import Mission, Scheme
+
+#: Shares of an effort's limit, as standard deviation, from which noise is a nuisance and a failure.
+NUISANCE, DROWNING = 0.3, 1.0
+
+
+def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield the share of the effort limits that noise commands, and each funnel's floor against noise."""
+    if not mission.truth.noise.size:
+        return
+    share = float((command_deviation(mission, scheme) / limits(scheme)).max())
+    yield Check(
+        "noise.authority",
+        share,
+        NUISANCE,
+        "-",
+        "fail" if not share < DROWNING else "warn",
+        "Noise alone commands this share of the limit (one standard deviation); clipped, it turns into drift.",
+        "Lower the gain from measurement to command, filter the measurement, or take better sensors.",
+        "direct gain of the command at the target times the noise's deviations, over the limits",
+    )
+    deviations = measurement_deviation(mission)
+    for funnel in mission.funnels:
+        floor = np.array(ca.DM(funnel.bounds.floor)).ravel()
+        noise = deviations[mission.truth.measurement.place(funnel.signal)]
+        yield Check(
+            f"noise.funnel.{funnel.signal}",
+            float((3 * noise / floor).max()),
+            1.0,
+            "-",
+            "fail",
+            "Three deviations of the measurement reach the funnel's wall though the signal stands at zero.",
+            "Widen the floor, or take better sensors.",
+            "three standard deviations over the floor",
+        )
+
+
+def limits(scheme: Scheme) -> np.ndarray:
+    """Return the smaller limit of each effort, (R,)."""
+    below, above = (np.abs(np.array(each)) for each in (scheme.actuation.limit_below, scheme.actuation.limit_above))
+    return np.minimum(below, above)
+
+
+def _functions(mission: Mission, scheme: Scheme | None) -> tuple[np.ndarray, np.ndarray]:
+    plant = mission.truth
+    x, noise = ca.DM(target_state(mission)), plant.noise.symbol("noise")
+    y = ca.SX(plant.measure(0.0, x, noise))
+    into = np.array(ca.DM(ca.substitute(ca.jacobian(y, noise), noise, 0)).full())
+    if scheme is None:
+        return into, into
+    quiet = ca.DM(plant.measure(0.0, x, ca.DM.zeros(plant.noise.size)))
+    memory = ca.DM(scheme.law.start(ca.DM(0.0), tapes.law_inputs(mission, scheme, quiet)))
+    seen = plant.measurement.symbol("y")
+    end = ca.DM(mission.timing.duration)
+    command = ca.SX(scheme.law.command(end, tapes.law_inputs(mission, scheme, seen), memory))
+    slope = ca.Function("slope", [seen], [ca.jacobian(command, seen)])
+    return into, np.array(ca.DM(slope(quiet)).full())
+
+
+def measurement_deviation(mission: Mission) -> np.ndarray:
+    """Return the standard deviation of every measured element at the target."""
+    into, _ = _functions(mission, None)
+    return np.sqrt((into**2).sum(axis=1))
+
+
+def command_deviation(mission: Mission, scheme: Scheme) -> np.ndarray:
+    """Return the standard deviation of the command at the target by direct feed-through, (R,)."""
+    into, slope = _functions(mission, scheme)
+    return np.sqrt(((slope @ into) ** 2).sum(axis=1))

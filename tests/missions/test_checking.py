@@ -1,0 +1,206 @@
+"""Truth: closed forms of simple plants, zero-order-hold theory, and the commands as a user runs them."""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass, replace
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy import signal
+
+import casadi_gnc
+from casadi_gnc.allocation import Direct
+from casadi_gnc.checks import Check, worst
+from casadi_gnc.laws import Law, PerformanceFunnel
+from casadi_gnc.missions.checking import authority, check, funnels, noise, sampling
+from casadi_gnc.missions.checking.linear import LinearLoop, spectral_radius
+from casadi_gnc.missions.mission import Actuation, Funnel, Mission, Scheme, Timing
+from casadi_gnc.plants import Plant
+from casadi_gnc.signals import Layout, Signal
+
+STATE = Layout((Signal("place", 1, "m", limit=1e3), Signal("speed", 1, "m/s", limit=1e3)))
+EFFORT = Layout((Signal("force", 1, "N"),))
+
+
+@dataclass(frozen=True, eq=False)
+class Cart(Plant):
+    """A unit mass on a line, pushed by a constant force and a slow wave."""
+
+    push: float = 0.0
+    deviation: float = 0.0
+
+    state = measurement = STATE
+    inputs = EFFORT
+
+    @property
+    def noise(self):
+        return Layout((Signal("sensor", 2),)) if self.deviation else Layout()
+
+    def measure(self, t, x, noise):
+        return x + self.deviation * noise if self.deviation else x
+
+    def rate(self, t, x, actuators, noise):
+        return ca.vertcat(x[1], actuators + self.push * ca.sin(0.01 * t))
+
+
+@dataclass(frozen=True, eq=False)
+class Spring(Law):
+    """Pull the cart home."""
+
+    stiffness: float = 1.0
+    damping: float = 2.0
+    inputs = STATE
+
+    def command(self, t, y, m):
+        return -self.stiffness * y[0] - self.damping * y[1]
+
+
+def mission(law=None, funnel=(), start=(0.9, 0.0), h=0.1, mode="sampled", **plant) -> Mission:
+    actuation = Actuation(
+        ca.DM.eye(1), [-1.0], [1.0], float("inf"), [-1.0], [1.0], Direct(), effort=Layout((Signal("force", 1, "N"),))
+    )
+    made = law or Spring(hold=h if mode == "sampled" else 0.0)
+    return Mission(
+        name="cart",
+        truth=Cart(**plant),
+        start=list(start),
+        timing=Timing(mode, h, 100.0),
+        schemes=(Scheme("spring", made, actuation),),
+        funnels=funnel,
+        target={"place": [0.0], "speed": [0.0]},
+    )
+
+
+def only(found: list[Check], name: str) -> Check:
+    return next(each for each in found if each.name == name)
+
+
+@pytest.mark.parametrize("damping", [0.5, 2.0, 19.0, 21.0])
+def test_sampled_poles_are_those_of_zero_order_hold(damping):
+    """Damping h > 2 is where the held loop of a unit mass with weak spring turns unstable."""
+    a, b = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]])
+    discrete, into, *_ = signal.cont2discrete((a, b, np.eye(2), np.zeros((2, 1))), 0.1)
+    gain = np.array([[1.0, damping]])
+    expected = np.abs(np.linalg.eigvals(discrete - into @ gain)).max()
+    chosen = mission(Spring(damping=damping, hold=0.1))
+    loop = LinearLoop(chosen, chosen.schemes[0], 0.0)
+    assert spectral_radius(loop.matrix) == pytest.approx(expected, rel=1e-12)
+    verdict = only(check(chosen), "sampling.closed_loop").verdict
+    assert verdict == ("fail" if damping > 20 else "ok")
+    # One sample late: the command that acts now was computed from the last state.
+    late = np.block([[discrete, into], [-gain, np.zeros((1, 1))]])
+    assert spectral_radius(loop.delayed) == pytest.approx(np.abs(np.linalg.eigvals(late)).max(), rel=1e-12)
+
+
+def test_runge_kutta_limit_is_that_of_the_real_axis():
+    """The method of order 4 is stable on the real axis to -2.785293563405282 (a root of its polynomial)."""
+    edge = 2.785293563405282
+    assert abs(sampling.amplification(np.array([-edge]))[0]) == pytest.approx(1.0, abs=1e-12)
+    for share, verdict in ((0.99, "ok"), (1.01, "fail")):
+        fast = share * edge / 0.1
+        chosen = mission(Spring(stiffness=fast, damping=fast + 1.0), mode="continuous")  # poles -1 and -fast
+        assert only(check(chosen), "sampling.runge_kutta").verdict == verdict
+
+
+def test_a_growing_loop_fails_in_both_modes():
+    for mode in ("sampled", "continuous"):
+        chosen = mission(Spring(stiffness=-1.0, hold=0.1 if mode == "sampled" else 0.0), mode=mode)
+        assert only(check(chosen), "sampling.closed_loop").verdict == "fail"
+
+
+def box(width: float) -> Funnel:
+    return Funnel("place", PerformanceFunnel(*(ca.DM([v]) for v in (width, width, 0.05, 1.0, 1.0))))
+
+
+def test_braking_in_a_box_needs_v_squared_over_two_distances():
+    """From 0.5 with speed 0.4 towards the wall at 1: 0.4^2 / (2 x 0.5) = 0.16 of the 1 N that there is."""
+    chosen = mission(funnel=(box(1.0),), start=(0.5, 0.4))
+    share = funnels.needed_share(chosen, chosen.schemes[0], chosen.funnels[0])
+    assert share == pytest.approx(0.16, rel=0.05)  # the wall is watched on a grid of 0.8 s
+
+
+def test_constant_push_bends_a_spring_by_push_over_stiffness():
+    chosen = mission(funnel=(box(0.5),), push=0.3)
+    use = funnels.floor_use(chosen, chosen.schemes[0], chosen.funnels[0])
+    # sin(0.01 t) peaks inside the last half of 100 s at sin(1) = 0.841; the lag is damping/stiffness x 0.01.
+    assert use == pytest.approx(0.3 * np.sin(1.0) / 0.5, rel=0.03)
+
+
+def test_static_demand_is_the_push_over_the_limit():
+    for push, verdict in ((0.5, "ok"), (1.3, "fail")):
+        chosen = mission(push=push)
+        found = only(check(chosen), "authority.static_demand")
+        assert found.value == pytest.approx(push * np.sin(1.0), rel=1e-2)
+        assert found.verdict == verdict
+
+
+def test_noise_share_is_gain_times_deviation():
+    chosen = mission(Spring(stiffness=3.0, damping=4.0, hold=0.1), deviation=0.1)
+    assert noise.command_deviation(chosen, chosen.schemes[0]) == pytest.approx([0.5], rel=1e-12)
+    assert only(check(chosen), "noise.authority").verdict == "warn"
+    assert noise.measurement_deviation(chosen) == pytest.approx([0.1, 0.1], rel=1e-12)
+
+
+def test_attainable_share_is_that_of_the_attainable_set():
+    """The largest cube of the paper's thrusters, as the room of allocation finds it by other means."""
+    from casadi_gnc.allocation import AllocationProblem
+    from casadi_gnc.allocation.attainable import attainable
+
+    chosen = casadi_gnc.load("huang2020/slew")
+    actuation = chosen.schemes[0].actuation
+    problem = AllocationProblem(np.array(actuation.effectiveness), lower=actuation.lower, upper=actuation.upper)
+    cube = attainable(problem, np.ones(3)).nominal.box[0]
+    share = authority.attainable_share(chosen, chosen.schemes[0])
+    assert share == pytest.approx(cube / actuation.limit_above[0], rel=1e-6)
+
+
+def test_verdicts_are_computed():
+    limit = Check("a", 1.0, 2.0, "", "fail", "", "")
+    assert (limit.verdict, limit.margin) == ("ok", 1.0)
+    assert replace(limit, value=3.0).verdict == "fail"
+    assert replace(limit, value=float("nan")).verdict == "fail"
+    assert replace(limit, at_least=True).verdict == "fail"
+    assert worst([limit, replace(limit, value=3.0, otherwise="note")]) == "note"
+    assert worst([]) == "ok"
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-m", "casadi_gnc.cli.main", "check", *arguments], capture_output=True, text=True, check=False
+    )
+
+
+def test_command_finds_the_slew_as_printed_and_draws(tmp_path):
+    told = command("huang2020/slew_as_printed", "--json", "--plot", str(tmp_path / "checks.png"))
+    assert told.returncode == 1
+    assert (tmp_path / "checks.png").stat().st_size > 10_000
+    found = {(c["scheme"], c["name"]): c for c in json.loads(told.stdout)["checks"]}
+    for name in ("gains.anti_windup", "funnel.floor.mrp", "sampling.closed_loop"):
+        assert found["funnel_pinv", name]["verdict"] == "fail"
+    assert found["funnel_pinv", "funnel.floor.mrp"]["value"] == "inf"
+    box_share = found["funnel_pinv", "authority.virtual_control"]
+    assert box_share["verdict"] == "note"
+    assert box_share["value"] == pytest.approx(5.16e-4 / 1.5e-3, rel=1e-2)
+    for theorem in ("compensation", "filter"):
+        assert found["funnel_pinv", f"gains.theorem1.{theorem}"]["verdict"] == "note"
+
+
+def test_command_reads_a_synthesis_and_names_what_cannot_be_met():
+    told = command("shi2020/as_printed")
+    assert told.returncode == 1
+    assert "'(26) input'" in told.stdout
+    assert command("shi2020/synthesis").returncode == 0
+
+
+def test_command_refuses_what_it_cannot_check(tmp_path):
+    told = command("huang2020/allocation")
+    assert (told.returncode, told.stdout) == (2, "")
+    assert 'check takes a file of kind "mission" or "synthesis"' in told.stderr
+    told = command("huang2020/detumble", "--scheme", "nobody")
+    assert told.returncode == 2
+    assert "no scheme 'nobody'" in told.stderr
+    told = command("huang2020/detumble", "--plot", str(tmp_path / "a.txt"))
+    assert told.returncode == 2
+    assert "a picture ends in .png" in told.stderr
