@@ -41,7 +41,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
             1 + ROUNDING,
             "-",
             "fail",
-            f"A step of {h:g} s multiplies a decaying mode by more than 1: what grows is the integrator's, not the loop's.",
+            f"A step of {h:g} s makes a decaying mode grow: that growth is the integrator's, not the loop's.",
             "Shorten sample_period_s, or take the part of the law out whose gain grows.",
             "stability polynomial of the Runge-Kutta method of order 4",
         )

@@ -8,12 +8,13 @@ A craft's module has
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
-from casadi_gnc.missions.mission import Actuation, Panel
+from casadi_gnc.checks import Check
+from casadi_gnc.missions.mission import Actuation, Mission, Panel, Scheme
 from casadi_gnc.plants import Plant
 
 #: Path of a key in the file -> "file, line n, key", for messages.
@@ -32,6 +33,9 @@ class Craft:
     believed : what the flight software believes; given to laws that have a `body`.
     actuation : makes the actuation of a scheme from the scheme's table.
     panels : what a flight's picture shows.
+    target : states that the laws regulate -> values that they bring them to.
+    checks : what only this craft can say of a mission before it flies.
+    truths : effectivenesses, (R, N), that errors and faults may make true, by what they are.
     notes : sentences that a reader of every flight must see.
     """
 
@@ -41,11 +45,20 @@ class Craft:
     believed: Any
     actuation: Callable[[Any], Actuation]
     panels: tuple[Panel, ...] = ()
+    target: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    checks: Callable[[Mission, Scheme], Iterable[Check]] = lambda mission, scheme: ()
+    truths: Callable[[Mission, Scheme], Mapping[str, Any]] = lambda mission, scheme: {}
     notes: tuple[str, ...] = ()
 
 
 #: Modules by the name that `spacecraft.model` gives.
-_HOMES = {"combined_spacecraft": "combined_spacecraft"}
+_HOMES = {
+    "combined_spacecraft": "combined_spacecraft",
+    "docking_pair": "docking_pair",
+    "wheel_spacecraft": "wheel_spacecraft",
+    "proximity_pair": "proximity_pair",
+    "drag_free_pair": "drag_free_pair",
+}
 
 
 def names() -> list[str]:

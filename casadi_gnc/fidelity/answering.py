@@ -1,0 +1,161 @@
+"""Answer claims: fly what is needed, compute the rest, in parallel, and remember the answers.
+
+Claims that ask the same flight are flown once. An answer is kept in the user's cache folder under
+the hash of the question and of everything that could change it: problem files, this package, the C.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import casadi_gnc
+from casadi_gnc import assets, compilers
+from casadi_gnc.errors import GncError
+from casadi_gnc.fidelity.claims import ClaimModel, ClaimsFile
+from casadi_gnc.fidelity.computations import COMPUTATIONS
+from casadi_gnc.fidelity.verdict import Answer
+from casadi_gnc.files import write_beside
+from casadi_gnc.status import StepStatus
+
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Question:
+    """One flight with all metrics asked of it, or one computation.
+
+    `key` orders by content: equal questions have equal keys.
+    """
+
+    kind: str
+    content: str
+
+    @property
+    def key(self) -> str:
+        """Hash of the question and of all that could change its answer."""
+        return hashlib.sha256(f"{self.kind}\n{self.content}\n{_surroundings()}".encode()).hexdigest()
+
+
+@cache
+def _surroundings() -> str:
+    """Return the hash of this package, the C sources, the problem files and the versions below."""
+    digest = hashlib.sha256()
+    folders = (Path(casadi_gnc.__file__).parent, assets.folder("codegen"), assets.folder("problems"))
+    for folder in folders:
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in (".py", ".c", ".h", ".j2", ".toml", ".csv") and path.name != "claims.toml":
+                digest.update(path.relative_to(folder).as_posix().encode())
+                digest.update(path.read_bytes())
+    for package in ("casadi", "numpy", "scipy", "clarabel"):
+        digest.update(metadata.version(package).encode())
+    return digest.hexdigest()
+
+
+def _questions(claims: list[ClaimModel]) -> dict[Question, list[tuple[str, str]]]:
+    """Return the questions with, for each, (id of the claim, name of the number in the answer)."""
+    asked: dict[Question, list[tuple[str, str]]] = {}
+    flights: dict[str, list[ClaimModel]] = {}
+    for claim in claims:
+        if claim.flight is not None:
+            flights.setdefault(json.dumps(claim.flight.model_dump(), sort_keys=True), []).append(claim)
+        for role, model in (("ours", claim.computation), ("bound", claim.bound)):
+            if model is not None:
+                question = Question("computation", json.dumps(model.model_dump(), sort_keys=True))
+                asked.setdefault(question, []).append((claim.id, role))
+    for flight, askers in flights.items():
+        content = {
+            "flight": json.loads(flight),
+            "metric": [{"name": claim.id, **claim.metric} for claim in askers if claim.metric is not None],
+            "status": {claim.id: claim.status.model_dump() for claim in askers if claim.status is not None},
+        }
+        question = Question("flight", json.dumps(content, sort_keys=True))
+        asked[question] = [(claim.id, "ours") for claim in askers]
+    return asked
+
+
+def answer(
+    file: ClaimsFile, *, processes: int = 2, progress: Progress | None = None, fresh: bool = False
+) -> list[Answer]:
+    """Return the answers to all claims of a file, in their order.
+
+    Parameters
+    ----------
+    processes : that fly and compute side by side.
+    progress : called as progress(questions answered, questions in all).
+    fresh : answer anew what the cache knows.
+
+    A question that cannot be answered becomes a row with its sentence; the rest goes on.
+    """
+    asked = _questions(file.claim)
+    numbers: dict[str, dict[str, Any]] = {claim.id: {"ours": None} for claim in file.claim}
+    for done, (question, found) in enumerate(_answered(list(asked), processes, fresh), 1):
+        for claim, role in asked[question]:
+            if "failure" in found:
+                numbers[claim]["failure"] = found["failure"]
+            else:
+                numbers[claim][role] = found["values"][claim if question.kind == "flight" else "value"]
+        if progress:
+            progress(done, len(asked))
+    return [Answer(claim, **numbers[claim.id]) for claim in file.claim]
+
+
+def _answered(questions: list[Question], processes: int, fresh: bool) -> Iterator[tuple[Question, dict[str, Any]]]:
+    """Yield questions with their answers as they come, those in the cache first."""
+    folder = compilers.cache_folder() / "claims"
+    missing = []
+    for question in questions:
+        known = None if fresh else _remembered(folder / f"{question.key}.json")
+        if known is None:
+            missing.append(question)
+        else:
+            yield question, known
+    if not missing:
+        return
+    with ProcessPoolExecutor(min(processes, len(missing)), mp_context=get_context("spawn")) as pool:
+        running: dict[Future, Question] = {pool.submit(find, question): question for question in missing}
+        for future in as_completed(running):
+            question, found = running[future], future.result()
+            if "failure" not in found:
+                folder.mkdir(parents=True, exist_ok=True)
+                text = json.dumps(found)
+                write_beside(folder / f"{question.key}.json", lambda path, text=text: path.write_text(text))
+            yield question, found
+
+
+def _remembered(path: Path) -> dict[str, Any] | None:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError):
+        return None
+
+
+def find(question: Question) -> dict[str, Any]:
+    """Return {"values": numbers by name}, or {"failure": one sentence}."""
+    content = json.loads(question.content)
+    try:
+        if question.kind == "computation":
+            return {"values": {"value": float(COMPUTATIONS[content["name"]](**content["arguments"]))}}
+        return {"values": _fly(**content)}
+    except (GncError, TypeError, KeyError) as error:
+        return {"failure": str(error)}
+
+
+def _fly(flight: dict[str, Any], metric: list[dict[str, Any]], status: dict[str, Any]) -> dict[str, float | None]:
+    """Return the metrics and status numbers of a flight by the ids of the claims that ask them."""
+    mission = casadi_gnc.load(flight["problem"], dict(flight["changes"], metric=metric))
+    alone = mission.with_scheme(flight["scheme"])
+    flown = casadi_gnc.fly(alone, mode=flight["mode"], decimation=mission.timing.samples)
+    values = dict(flown.metrics)
+    for claim, asked in status.items():
+        samples, first = flown.statuses.get(StepStatus[asked["name"]], (0, None))
+        values[claim] = float(samples) if asked["value"] == "samples" else first
+    return values

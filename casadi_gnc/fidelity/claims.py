@@ -1,0 +1,122 @@
+"""What a claims file may say: the printed numbers of a paper and what answers each.
+
+A claim is answered by one metric of a flight, or by a named computation. The verdict is never
+written down; `casadi_gnc.fidelity.verdict` computes it from the two numbers.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from casadi_gnc import assets
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.fidelity.computations import COMPUTATIONS
+from casadi_gnc.missions import loading
+from casadi_gnc.missions.schema import Format, MetricModel, Name, NonNegative, Part
+from casadi_gnc.status import StepStatus
+
+
+class FlightModel(Part):
+    """The flight that answers a claim: a shipped problem, one of its schemes, and what is changed."""
+
+    problem: str
+    scheme: str
+    mode: Literal["sampled", "continuous"] | None = None
+    changes: dict[str, Any] = Field(default={}, description="values by path, e.g. 'truth.inertia_factor'")
+
+
+class StatusModel(Part):
+    """A number of a status bit: how many samples raised it, or when the first did [s]."""
+
+    name: Literal[tuple(bit.name for bit in StepStatus)]  # type: ignore[valid-type]
+    value: Literal["samples", "first_s"]
+
+
+class ComputationModel(Part):
+    """The computation that answers a claim."""
+
+    name: str
+    arguments: dict[str, Any] = {}
+
+    @field_validator("name")
+    @classmethod
+    def _is_known(cls, value: str) -> str:
+        if value not in COMPUTATIONS:
+            raise ValueError(f"no computation {value!r}; there is {', '.join(COMPUTATIONS)}")
+        return value
+
+
+class ClaimModel(Part):
+    """One printed number."""
+
+    id: Name
+    text: str = Field(description="what is claimed, in a few words")
+    where: str = Field(description="where it is printed")
+    printed: float
+    unit: str = ""
+    relation: Literal["equals", "at_most", "at_least"] = Field(
+        default="equals", description="equals: the printed number itself; else the number is a bound"
+    )
+    tolerance: NonNegative = Field(default=0.0, description="relative to the printed number")
+    tolerance_absolute: NonNegative = 0.0
+    assumption: str = Field(default="", description="what the paper does not say and the answer needs")
+    flight: FlightModel | None = None
+    metric: dict[str, Any] | None = Field(default=None, description="as [[metric]] of a mission, without a name")
+    status: StatusModel | None = Field(default=None, description="instead of a metric: a status of the flight")
+    computation: ComputationModel | None = None
+    bound: ComputationModel | None = Field(
+        default=None, description="a number that no implementation can pass; the printed one may"
+    )
+    bound_is: Literal["lowest", "highest"] = "lowest"
+
+    @model_validator(mode="after")
+    def _has_one_answer(self) -> ClaimModel:
+        if (self.flight is None) == (self.computation is None):
+            raise ValueError(f"claim {self.id!r} needs either a flight or a computation")
+        if (self.flight is not None) != ((self.metric is not None) + (self.status is not None) == 1):
+            raise ValueError(f"claim {self.id!r}: a flight, and nothing else, takes either a metric or a status")
+        if self.metric is not None:
+            MetricModel.model_validate({"name": self.id, **self.metric})
+        return self
+
+
+class ClaimsFile(Part):
+    """The claims of one paper."""
+
+    format: Format
+    kind: Literal["claims"]
+    paper: str
+    doi: str
+    claim: Annotated[list[ClaimModel], Field(min_length=1)]
+
+    @field_validator("claim")
+    @classmethod
+    def _ids_differ(cls, value: list[ClaimModel]) -> list[ClaimModel]:
+        ids = [claim.id for claim in value]
+        for one in ids:
+            if ids.count(one) > 1:
+                raise ValueError(f"the claim {one!r} is given twice")
+        return value
+
+
+def papers() -> dict[str, Path]:
+    """Return the claims files that are shipped, by the paper's name, e.g. "huang2020"."""
+    return {path.parent.name: path for path in sorted(assets.folder("problems").glob("*/claims.toml"))}
+
+
+def read_claims(paper: str) -> ClaimsFile:
+    """Return the claims of a shipped paper, or of a claims file given by its path.
+
+    Raises
+    ------
+    ProblemError
+        For an unknown paper or a file that is wrong; the message has file, line and key.
+    """
+    known = papers()
+    if paper not in known and not Path(paper).is_file():
+        raise ProblemError(f"no paper {paper!r}; there is {', '.join(known)}, or the path of a claims file")
+    path, text, data = loading.read_kind(known.get(paper, Path(paper)), "claims")
+    return loading.validated(ClaimsFile, data, path, text)

@@ -1,0 +1,27 @@
+"""Named computations that answer claims which no flight answers: numbers from numbers.
+
+A module of this room is a paper; its public functions take plain data and return a float. A
+computation's name in a claims file is `module.function`.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+
+_PAPERS = ("huang2020",)
+
+
+def _collect() -> dict[str, Callable[..., float]]:
+    found: dict[str, Callable[..., float]] = {}
+    for paper in _PAPERS:
+        module = import_module(f"{__name__}.{paper}")
+        for name, function in inspect.getmembers(module, inspect.isfunction):
+            if not name.startswith("_") and function.__module__ == module.__name__:
+                found[f"{paper}.{name}"] = function
+    return found
+
+
+#: Computations by their name in a claims file.
+COMPUTATIONS = _collect()

@@ -1,0 +1,146 @@
+"""Verdicts are computed: a changed number changes them, and what fails is a row, not the end."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import pytest
+
+from casadi_gnc import fidelity
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.fidelity.claims import ClaimModel
+from casadi_gnc.fidelity.verdict import Answer, Verdict
+
+HEAD = 'format = 1\nkind = "claims"\npaper = "a paper"\ndoi = "10.1/1"\n'
+CUBE = """
+[[claim]]
+id = "cube"
+text = "the largest cube"
+where = "here"
+printed = {printed}
+tolerance = 0.01
+computation = {{ name = "{name}" }}
+"""
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, "-m", "casadi_gnc.cli.main", "reproduce", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def written(folder, printed=5.16e-4, name="huang2020.attainable_cube", more="") -> str:
+    path = folder / "claims.toml"
+    path.write_text(HEAD + CUBE.format(printed=printed, name=name) + more)
+    return str(path)
+
+
+def claim(**changes) -> ClaimModel:
+    plain = {"id": "a", "text": "t", "where": "w", "printed": 2.0, "computation": {"name": "huang2020.inertia_trace"}}
+    return ClaimModel.model_validate({**plain, **changes})
+
+
+@pytest.mark.parametrize(
+    ("changes", "ours", "verdict"),
+    [
+        ({"tolerance": 0.1}, 2.1, Verdict.REPRODUCED),
+        ({"tolerance": 0.1}, 2.3, Verdict.NOT_REPRODUCED),
+        ({"tolerance": 0.1, "assumption": "x"}, 2.1, Verdict.UNDER_ASSUMPTION),
+        ({"relation": "at_most"}, 1.0, Verdict.REPRODUCED),
+        ({"relation": "at_most"}, 2.5, Verdict.NOT_REPRODUCED),
+        ({"relation": "at_least"}, 2.5, Verdict.REPRODUCED),
+        ({"relation": "at_least", "tolerance_absolute": 0.6}, 1.5, Verdict.REPRODUCED),
+        ({}, None, Verdict.NOT_REPRODUCED),
+        ({"relation": "at_most"}, float("nan"), Verdict.NOT_REPRODUCED),
+    ],
+)
+def test_verdict_follows_from_the_numbers(changes, ours, verdict):
+    assert Answer(claim(**changes), ours).verdict is verdict
+
+
+def test_a_bound_makes_a_number_impossible_only_where_it_is_passed():
+    low = Answer(claim(), 5.0, bound=3.0)
+    assert low.verdict is Verdict.IMPOSSIBLE
+    assert replace(low, bound=1.0).verdict is Verdict.NOT_REPRODUCED
+    assert replace(low, claim=claim(bound_is="highest")).verdict is Verdict.NOT_REPRODUCED
+    assert replace(low, claim=claim(bound_is="highest"), bound=1.0).verdict is Verdict.IMPOSSIBLE
+    assert replace(low, failure="it broke").verdict is Verdict.FAILED
+
+
+def test_a_changed_printed_number_flips_its_verdict(tmp_path):
+    told = run(written(tmp_path), "--json")
+    assert told.returncode == 0, told.stderr
+    (row,) = json.loads(told.stdout)["papers"][0]["claims"]
+    assert row["verdict"] == "reproduced"
+    told = run(written(tmp_path, printed=6e-4), "--json")
+    assert json.loads(told.stdout)["papers"][0]["claims"][0]["verdict"] == "not reproduced"
+
+
+def test_what_cannot_be_flown_is_a_row_and_the_rest_goes_on(tmp_path):
+    broken = """
+[[claim]]
+id = "broken"
+text = "a flight of nobody"
+where = "nowhere"
+printed = 1.0
+flight = { problem = "huang2020/detumble", scheme = "nobody" }
+metric = { kind = "peak", signal = "rate" }
+"""
+    told = run(written(tmp_path, more=broken), "--json")
+    assert told.returncode == 1
+    cube, nobody = json.loads(told.stdout)["papers"][0]["claims"]
+    assert cube["verdict"] == "reproduced"
+    assert nobody["verdict"] == "failed"
+    assert "no scheme 'nobody'" in nobody["failure"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nobody2020"], "no paper 'nobody2020'; there is huang20"),
+        (["{bad computation}"], "claim[1].computation.name: no computation 'huang2020.nothing'"),
+        (["{bad metric}"], "claim[1]"),
+    ],
+)
+def test_bad_input_is_one_sentence(arguments, sentence, tmp_path):
+    if arguments == ["{bad computation}"]:
+        arguments = [written(tmp_path, name="huang2020.nothing")]
+    elif arguments == ["{bad metric}"]:
+        path = tmp_path / "claims.toml"
+        flight = 'flight = { problem = "huang2020/detumble", scheme = "damping_pinv" }\n'
+        flight += 'metric = { kind = "most", signal = "rate" }'
+        path.write_text(HEAD + CUBE.format(printed=1.0, name="x").replace('computation = { name = "x" }', flight))
+        arguments = [str(path)]
+    told = run(*arguments)
+    assert (told.returncode, told.stdout) == (2, "")
+    assert sentence in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_equal_flights_are_flown_once():
+    from casadi_gnc.fidelity.answering import _questions
+
+    claims = fidelity.read_claims("huang2020").claim
+    flights = [question for question in _questions(claims) if question.kind == "flight"]
+    asked = [claim.flight.model_dump_json() for claim in claims if claim.flight is not None]
+    assert len(flights) == len(set(asked)) < len(asked)
+
+
+@pytest.mark.parametrize("paper", sorted(fidelity.papers()))
+def test_shipped_claims_are_many_and_name_what_exists(paper):
+    """Twenty or more a paper; every flight names a shipped problem and one of its schemes."""
+    import casadi_gnc
+
+    claims = fidelity.read_claims(paper).claim
+    assert len(claims) >= 20
+    for problem, scheme in {(c.flight.problem, c.flight.scheme) for c in claims if c.flight is not None}:
+        casadi_gnc.load(problem, strict=False).scheme(scheme)
+
+
+def test_unknown_claims_file_names_what_there_is():
+    with pytest.raises(ProblemError, match="no paper 'x'"):
+        fidelity.read_claims("x")
