@@ -34,7 +34,7 @@ def advance(law: Law, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any
     affine = _affine_rows(law, slope, symbol)
     moved = symbol[:]
     if affine:
-        exactly = law.hold * ca.mtimes(_phi1(slope[affine, affine] * law.hold), rate[affine])
+        exactly = law.hold * ca.mtimes(phi1(slope[affine, affine] * law.hold), rate[affine])
         moved[affine] = symbol[affine] + exactly
     others = [row for row in range(law.memory.size) if row not in affine]
     if others:
@@ -57,7 +57,7 @@ def _affine_rows(law: Law, slope: ca.SX, symbol: ca.SX) -> list[int]:
         kept = [name for name in kept if name not in leaning]
 
 
-def _phi1(a: ca.SX) -> ca.SX:
+def phi1(a: ca.SX) -> ca.SX:
     """Return phi1 of a constant matrix: element by element if diagonal, else scaled and doubled."""
     if a.sparsity().is_diag() or not a.nnz():
         entries = [a[i, i] for i in range(a.shape[0])]

@@ -88,7 +88,8 @@ class Actuation:
     limit_below, limit_above : (R,), box of the virtual control, units of `effort`.
     allocator : an object with `report` and either `expression` (CasADi) or `start` (numpy).
     effort : what the actuators make together, one signal a kind; R rows.
-    reach : function of the measured signals that returns further bounds, lower and upper, (N,) each.
+    reach : function of the measured signals and the sample period that returns further bounds, lower and
+        upper, (N,) each.
     judge : function (measured signals, limited effort, actuators) -> flags by status bit, on board.
     inverse : function (measured signals, limited effort) -> actuators, (N,), that a craft knows better
         than an allocator could: the allocator is then given this in the place of the effort.
@@ -102,7 +103,7 @@ class Actuation:
     limit_above: list[float]
     allocator: Any
     effort: Layout = TORQUE
-    reach: Callable[[Any], tuple[Any, Any]] | None = None
+    reach: Callable[[Any, float], tuple[Any, Any]] | None = None
     judge: Callable[[Any, Any, Any], dict[StepStatus, Any]] | None = None
     inverse: Callable[[Any, Any], Any] | None = None
 

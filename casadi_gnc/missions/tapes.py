@@ -14,6 +14,8 @@ judge     y, limited, actuators -> flags
 after     t, y, m, wanted, limited, actuators -> m              (sampled mode)
 plant     t, x, actuators, noise -> x, one Runge-Kutta step     (sampled mode)
 flow      t, x, y, m, wanted, limited, actuators, noise -> x', m'     (continuous mode)
+stage     t, x, good, m, actuators, noise -> x', m'; sense to flow in one, so that they share what they
+          have in common                                     (continuous mode, symbolic allocation)
 point     s, slope, length -> s, an integrator stage         (continuous mode)
 join      s, k1, k2, k3, k4 -> s, the stages' sum            (continuous mode)
 settle    x -> x in the representation kept between steps
@@ -136,8 +138,9 @@ def achieved(mission: Mission, scheme: Scheme, y: Any, limited: Any, actuators: 
 
 def allocated(mission: Mission, scheme: Scheme, y: Any, limited: Any, previous: Any, lower: Any, upper: Any) -> Any:
     """Return what the actuators are told, (N,), where the allocation is an expression."""
-    matrix = scheme.actuation.matrix(mission.truth.measurement.split(y))
-    return scheme.actuation.allocator.expression(limited, previous, lower, upper, matrix)
+    actuation, seen = scheme.actuation, mission.truth.measurement.split(y)
+    asked = limited if actuation.inverse is None else actuation.inverse(seen, limited)
+    return actuation.allocator.expression(asked, previous, lower, upper, actuation.matrix(seen))
 
 
 def before(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
@@ -161,7 +164,8 @@ def before(mission: Mission, scheme: Scheme, s: Any) -> dict[str, Any]:
     lower, upper = ca.SX(ca.DM(actuation.lower)), ca.SX(ca.DM(actuation.upper))
     if actuation.reach is not None:
         # The amplitude box wins: a bound outside it becomes its edge.
-        least, most = actuation.reach(mission.truth.measurement.split(accepted))
+        measured = mission.truth.measurement.split(accepted)
+        least, most = actuation.reach(measured, mission.timing.sample_period)
         lower, upper = bounds.clip(least, lower, upper), bounds.clip(most, lower, upper)
     if actuation.rate < float("inf"):
         # Clipped to the amplitude box, which wins where a previous force lies outside it.
@@ -293,6 +297,8 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
         slope = ca.vertcat(plant.rate(s.t, s.x, s.actuators, s.noise), law.rate(s.t, seen, s.m, s.wanted, told))
         ports = {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}, "noise": s.noise}
         tapes["flow"] = function("flow", ports, {"slope": slope})
+        if scheme.actuation.is_symbolic:
+            tapes["stage"] = _stage(mission, scheme)
         tapes.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
     row = row_layout(mission, scheme)
     tally, fold = metrics.fold(mission.metrics, row)
@@ -305,6 +311,19 @@ def plant_step(mission: Mission, t: Any, x: Any, actuators: Any, noise_: Any) ->
     """Return x one substep later, by one Runge-Kutta step under held actuators and noise."""
     step = mission.timing.sample_period / mission.timing.substeps
     return runge_kutta(lambda at, state: mission.truth.rate(at, state, actuators, noise_), t, x, step)
+
+
+def _stage(mission: Mission, scheme: Scheme) -> ca.Function:
+    """Return the rates of plant and memory, controller and all, at a point of the integrator."""
+    s, plant, law = Symbols(mission, scheme), mission.truth, scheme.law
+    ports = {"t": s.t, "x": s.x, "good": s.good, "m": s.m, "actuators": s.actuators, "noise": s.noise}
+    s.y = plant.measure(s.t, s.x, s.noise)
+    first = before(mission, scheme, s)
+    y, limited = first["accepted"], first["limited"]
+    told = allocated(mission, scheme, y, limited, s.actuators, first["lower"], first["upper"])
+    effort, seen = achieved(mission, scheme, y, limited, told), law_inputs(mission, scheme, y)
+    moved = law.rate(s.t, seen, first["memory"], first["wanted"], effort)
+    return function("stage", ports, {"slope": ca.vertcat(plant.rate(s.t, s.x, told, s.noise), moved)})
 
 
 def _integrator(size: int, h: float) -> dict[str, ca.Function]:
