@@ -15,7 +15,7 @@ _SENTENCES = {
     128: "The law's memory was no longer finite or credible; it was started afresh.",
     256: "The law's command was not finite; none was given on that axis.",
     512: "The craft was inside the keep-out sphere of its target.",
-    1024: "The effectiveness was nearly singular; a damped inverse gave up some of the wanted effort.",
+    1024: "The actuators' map was nearly singular; some effort takes very large commands or was given up.",
     2048: "The craft were too close for the actuator's far-field model; its efforts cannot be trusted.",
     4096: "The craft closed in faster than the approach-speed limit.",
     8192: "A wheel was at its speed limit; it can brake but no longer accelerate.",

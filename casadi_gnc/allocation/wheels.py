@@ -15,11 +15,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import product
 
+import casadi as ca
 import numpy as np
 from scipy.linalg import null_space
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.reaction_wheels import acceleration_bounds
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +71,9 @@ class WheelSet:
         speed = np.asarray(speed, dtype=float)
         if speed.shape != (problem.count,) or not period > 0:
             raise AllocationError(f"speed has shape {speed.shape}, expected ({problem.count},); period {period} > 0")
-        # A wheel beyond its limit may only slow down; the amplitude box wins where both clash.
-        lower = np.clip((-self.max_speed - speed) / period, problem.lower, problem.upper)
-        upper = np.clip((self.max_speed - speed) / period, problem.lower, problem.upper)
+        box = (ca.DM(problem.lower), ca.DM(problem.upper))
+        reachable = acceleration_bounds(ca.DM(speed), self.max_speed, period, *box)
+        lower, upper = (np.array(bound).ravel() for bound in reachable)
         turning = problem.lower < problem.upper  # dead and stuck wheels take no part
         free, wanted = null_space(problem.effectiveness[:, turning]), np.zeros(problem.count)
         wanted[turning] = -desaturation * free @ (free.T @ speed[turning])

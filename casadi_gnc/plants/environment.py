@@ -10,7 +10,7 @@ import casadi as ca
 
 @dataclass(frozen=True)
 class HarmonicTorque:
-    """Model d(t) = constant + sum_k amplitude_k sin(frequency_k t), body frame.
+    """Model d(t) = constant + sum_k amplitude_k sin(frequency_k t + phase_k), body frame.
 
     Huang, Biggs, Duan (2020), section 5.1.
 
@@ -19,15 +19,18 @@ class HarmonicTorque:
     constant : (3,), [N m].
     frequencies : K numbers, [rad/s].
     amplitudes : K rows of three numbers, [N m].
+    phases : K angles, [rad]; all zero if left out.
     """
 
     constant: tuple[float, ...] = (0.0, 0.0, 0.0)
     frequencies: tuple[float, ...] = ()
     amplitudes: tuple[tuple[float, ...], ...] = ()
+    phases: tuple[float, ...] = ()
 
     def torque(self, t: Any) -> Any:
         """Return d(t), (3,), [N m]."""
         total = ca.DM(list(self.constant))
-        for frequency, amplitude in zip(self.frequencies, self.amplitudes, strict=True):
-            total = total + ca.DM(list(amplitude)) * ca.sin(frequency * t)
+        phases = self.phases or (0.0,) * len(self.frequencies)
+        for frequency, amplitude, phase in zip(self.frequencies, self.amplitudes, phases, strict=True):
+            total = total + ca.DM(list(amplitude)) * ca.sin(frequency * t + phase)
         return total

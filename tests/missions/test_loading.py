@@ -105,13 +105,16 @@ def test_binary_file_is_told(tmp_path):
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_problems_load(name):
     others = {"allocation": load_allocation, "synthesis": load_synthesis}
-    if (kind := read(name)[2]["kind"]) in others:
+    kind = read(name)[2]["kind"]
+    if kind in others:
         assert others[kind](name).title
-        return
-    mission = casadi_gnc.load(name)
-    assert mission.title
-    assert "doi" in mission.source
-    assert len(mission.schemes) >= 3
+    elif kind == "mission":
+        mission = casadi_gnc.load(name, strict=False)
+        assert mission.title
+        assert "doi" in mission.source
+        assert mission.panels
+    else:
+        assert kind in ("claims", "benchmark"), kind  # read by the rooms above this one
 
 
 def test_places_of_keys():

@@ -68,7 +68,7 @@ def mission(**changes) -> Mission:
         limit_above=[0.5] * 4,
         allocator=Direct(),
         effort=EFFORT,
-        reach=lambda seen: (ca.DM([-1.0] * 4), ca.vertcat(1, 1, 1, 0.3)),
+        reach=lambda seen, period: (ca.DM([-1.0] * 4), ca.vertcat(1, 1, 1, 0.3)),
         judge=lambda seen, limited, actuators: {StepStatus.WHEEL_SATURATED: actuators[3] >= 0.3},
     )
     wide = PerformanceFunnel(*(ca.DM([value] * 3) for value in (3.0, 0.5, 0.1, 1.0, 1.0)))

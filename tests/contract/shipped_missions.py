@@ -1,0 +1,30 @@
+"""The shipped missions, one scheme for each law that they fly: what the contract tests run over."""
+
+from functools import cache
+
+import casadi_gnc
+from casadi_gnc.laws import LAWS, Law
+from casadi_gnc.missions.loading import read, shipped
+from casadi_gnc.missions.mission import Mission, Scheme
+
+
+@cache
+def missions() -> dict[str, Mission]:
+    """Return all shipped missions by name, loaded once."""
+    return {name: casadi_gnc.load(name, strict=False) for name in shipped() if read(name)[2]["kind"] == "mission"}
+
+
+@cache
+def flown_by() -> dict[str, tuple[Mission, Scheme]]:
+    """Return for each law, by its name in files, a mission and the first scheme that flies it uncorrected by errata."""
+    found: dict[str, tuple[Mission, Scheme]] = {}
+    for mission in missions().values():
+        for scheme in mission.schemes:
+            name = name_of(scheme.law)
+            if name not in found or (found[name][1].law.printed and not scheme.law.printed):
+                found[name] = (mission, scheme)
+    return found
+
+
+def name_of(law: Law) -> str:
+    return next(name for name, kind in LAWS.items() if type(law) is kind)
