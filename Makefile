@@ -1,6 +1,7 @@
 # make demo   fly the de-tumble mission; pictures and table in out/detumble
 # make test   style, types and the whole test suite
 # make bench  speed, as ratios in one run
+# make targets  compilers and emulators of the flight targets (Debian packages; needs root)
 # Everything is installed into .venv here; needed beforehand: python3 (3.11 or newer, with venv), a
 # C compiler and make.
 
@@ -8,7 +9,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test bench pictures lint docs clean
+.PHONY: demo test bench targets pictures lint docs clean
 
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
@@ -26,10 +27,21 @@ pictures: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/slew.toml --out $(OUT)/slew
 	$(BIN)/casadi-gnc attainable problems/huang2020/allocation.toml --plot docs/images/attainable.png
 	cp $(OUT)/slew/funnel_robust.png docs/images/slew.png
+	$(BIN)/casadi-gnc fly problems/shi2020/docking.toml --scheme iobc --out $(OUT)/docking
+	cp $(OUT)/docking/iobc.png docs/images/docking.png
+	$(BIN)/casadi-gnc fly problems/huang2019/vertices.toml --out $(OUT)/vertices
+	cp $(OUT)/vertices/comparison.png docs/images/wheels_vertices.png
 
 bench: .venv/installed-dev
 	$(BIN)/python tests/bench/flight_speed.py
 	$(BIN)/python tests/bench/allocation_speed.py
+
+# What codegen/targets/*.toml name under `packages`.
+TARGETS := $(shell sed -n 's/^packages = \[\(.*\)\]/\1/p' codegen/targets/*.toml | tr -d '",')
+
+targets:
+	apt-get update -qq
+	apt-get install -y -qq --no-install-recommends $(sort $(TARGETS))
 
 docs: .venv/installed-docs
 	$(BIN)/sphinx-build -W -q docs docs/_build

@@ -107,6 +107,10 @@ class Law:
     def check_hold(self) -> None:
         """Raise `LawError` if the law cannot work at its sample period; say which one it could keep."""
 
+    def keeps(self, signal: str) -> bool:
+        """Return whether the law means to keep a measured signal inside its funnel."""
+        return signal in self.funnels.values()
+
     def checks(self) -> Iterable[Check]:
         """Return what can be said of the gains alone: the conditions of the source's theorems."""
         return ()

@@ -2,7 +2,26 @@
 
 from casadi_gnc.plants._plant import Plant
 from casadi_gnc.plants.combined_spacecraft import BodyPart, CombinedSpacecraft, compose_inertia
+from casadi_gnc.plants.docking_pair import DockingPair, FaultPiece, FaultProfile, MeasurementNoise
 from casadi_gnc.plants.drag_free_pair import DragFreePair
 from casadi_gnc.plants.environment import HarmonicTorque
+from casadi_gnc.plants.proximity_pair import OrbitalDisturbance, ProximityPair, RelativeSensor
+from casadi_gnc.plants.wheel_spacecraft import SensorError, WheelSpacecraft
 
-__all__ = ["BodyPart", "CombinedSpacecraft", "DragFreePair", "HarmonicTorque", "Plant", "compose_inertia"]
+__all__ = [
+    "BodyPart",
+    "CombinedSpacecraft",
+    "DockingPair",
+    "DragFreePair",
+    "FaultPiece",
+    "FaultProfile",
+    "HarmonicTorque",
+    "MeasurementNoise",
+    "OrbitalDisturbance",
+    "Plant",
+    "ProximityPair",
+    "RelativeSensor",
+    "SensorError",
+    "WheelSpacecraft",
+    "compose_inertia",
+]

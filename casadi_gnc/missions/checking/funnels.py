@@ -30,7 +30,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield, for every funnel, the share of the actuators that keeping it takes at least."""
     for funnel in mission.funnels:
         # A law that does not know the funnel promises nothing about it: a baseline that is watched.
-        otherwise = "fail" if funnel.signal in scheme.law.funnels.values() else "note"
+        otherwise = "fail" if scheme.law.keeps(funnel.signal) else "note"
         if funnel.signal in mission.truth.state and funnel.signal in mission.target:
             yield Check(
                 f"funnel.authority.{funnel.signal}",

@@ -18,6 +18,8 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     if not mission.target or not scheme.law.memory.size:
         return
     loop = LinearLoop(mission, scheme, 0.0)
+    if not loop.exists:
+        return
     memory = loop.memory_when_saturated
     if loop.sampled:
         value, limit, unit = spectral_radius(memory), 1 + ROUNDING, "-"

@@ -55,6 +55,11 @@ class LinearLoop:
         """The Jacobian over what is regulated, then the memory."""
         return self._jacobians[0]
 
+    @property
+    def exists(self) -> bool:
+        """Whether the loop has a slope at its target; laws with roots of the error have none."""
+        return all(np.isfinite(each).all() for each in self._jacobians)
+
     @cached_property
     def memory_when_saturated(self) -> np.ndarray:
         """The Jacobian of the memory alone while measurement and achieved effort stand still."""
@@ -77,17 +82,18 @@ class LinearLoop:
         quiet = ca.DM.zeros(mission.truth.noise.size)
         y = mission.truth.measure(s.t, s.x, quiet)
         seen = tapes.law_inputs(mission, self.scheme, y)
-        wanted = law.command(s.t, seen, s.m)
+        memory = law.jump(s.t, seen, s.m)
+        wanted = law.command(s.t, seen, memory)
         actuators = self.unlimited(y, wanted)
         told = ca.SX.sym("told", wanted.numel())
         if self.sampled:
             x, h = s.x, mission.timing.sample_period / mission.timing.substeps
             for i in range(mission.timing.substeps):
                 x = tapes.plant_step(mission, s.t + i * h, x, s.actuators, quiet)
-            later = advance(law, s.t, seen, s.m, wanted, told)
+            later = advance(law, s.t, seen, memory, wanted, told)
         else:
             x = mission.truth.rate(s.t, s.x, s.actuators, quiet)
-            later = law.rate(s.t, seen, s.m, wanted, told)
+            later = law.rate(s.t, seen, memory, wanted, told)
         made = tapes.made(mission, self.scheme, y, actuators)
         return s, (x, later, actuators, made, told)
 
@@ -154,6 +160,18 @@ class LinearLoop:
         """Return the least actuator commands that make the wanted effort, bounds left out."""
         matrix = self.scheme.actuation.matrix(self.mission.truth.measurement.split(y))
         return ca.mtimes(matrix.T, ca.solve(ca.mtimes(matrix, matrix.T), wanted))
+
+
+def command_slope(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
+    """Return d(command)/d(measurement) at the target at the end of the flight, and that measurement."""
+    plant, seen = mission.truth, mission.truth.measurement.symbol("y")
+    y = ca.DM(plant.measure(0.0, ca.DM(target_state(mission)), ca.DM.zeros(plant.noise.size)))
+    memory = ca.DM(scheme.law.start(ca.DM(0.0), tapes.law_inputs(mission, scheme, y)))
+    end = ca.DM(mission.timing.duration)
+    inputs = tapes.law_inputs(mission, scheme, seen)
+    command = ca.SX(scheme.law.command(end, inputs, scheme.law.jump(end, inputs, memory)))
+    slope = ca.Function("slope", [seen], [ca.jacobian(command, seen)])
+    return np.array(ca.DM(slope(y)).full()), np.array(y).ravel()
 
 
 def spectral_radius(matrix: np.ndarray) -> float:

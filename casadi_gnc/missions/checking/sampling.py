@@ -22,6 +22,19 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     if not mission.target:
         return
     loops = [LinearLoop(mission, scheme, t) for t in (0.0, mission.timing.duration)]
+    # Printed laws may have gains beyond all numbers late in the flight: that is a finding, not a gap.
+    if not loops[0].exists:
+        yield Check(
+            "sampling.linearisation",
+            float("nan"),
+            0.0,
+            "-",
+            "note",
+            "The law has no slope at its target, so nothing linear can be said of it.",
+            "Fly it, with noise and at several sample times.",
+            "Jacobian of the loop at the target",
+        )
+        return
     h = mission.timing.sample_period
     if mission.timing.mode == "continuous":
         poles: Any = np.concatenate([_eigenvalues(loop.matrix) for loop in loops])
