@@ -176,6 +176,7 @@ class Panel:
     label : what stands at the axis, without unit.
     scale, unit : factor applied, and the unit that it gives.
     logarithmic : of "lines": the magnitude on a logarithmic axis.
+    level, level_label : of "lines": a value to draw a line at, in the signal's unit, and what it is.
     """
 
     kind: Literal["tracked", "effort", "actuators", "lines"]
@@ -184,6 +185,8 @@ class Panel:
     scale: float = 1.0
     unit: str = ""
     logarithmic: bool = False
+    level: float | None = None
+    level_label: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ Made to be read at half the width of a page: few words, units on every axis, bou
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,16 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
     component of every tracked signal.
     """
     wanted: list[tuple[str, str, float | None, str]]
-    wanted = [(name, "share of the funnel used [-]", 1.0, "wall of the funnel") for name in _uses(mission)]
+    several = len(mission.funnels) > 1
+    wanted = [
+        (
+            funnel_signals(mission, funnel).names[-1],
+            f"{funnel.signal}: share used [-]" if several else "share of the funnel used [-]",
+            1.0,
+            "" if number else "wall of the funnel",
+        )
+        for number, funnel in enumerate(mission.funnels)
+    ]
     if not wanted:
         for panel in (panel for panel in mission.panels if panel.kind == "tracked"):
             level = next(iter(_thresholds(mission, panel.signal)), None)
@@ -64,16 +74,11 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
             each.semilogy(*_thin(flight.time, np.maximum(size, 1e-12)), color=colour, label=title, linewidth=1.8)
         if level is not None:
             each.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=told)
-        each.set_ylabel(label)
+        each.set_ylabel(label if len(wanted) == 1 else "\n".join(textwrap.wrap(label, 22)))
     axes[-1].set_xlabel("time [s]")
     axes[0].set_title(_plain(mission.title), fontsize=_FONT + 1, loc="left")
     figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)
     return _save(figure, folder / "comparison.png")
-
-
-def _uses(mission: Mission) -> list[str]:
-    """Return the recorded signals that tell how much of each funnel is used."""
-    return [funnel_signals(mission, funnel).names[-1] for funnel in mission.funnels]
 
 
 def _thresholds(mission: Mission, signal: str) -> list[float]:
@@ -143,8 +148,10 @@ def _signal(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
         axes.set_yscale("log")
     _lines(axes, flight.time, block, _labels(block.shape[1]))
     axes.set_ylabel(_axis(panel, flight, panel.signal))
-    if block.shape[1] > 1:
-        _legend(axes, block.shape[1])
+    if panel.level is not None:
+        axes.axhline(panel.level * panel.scale, color="0.4", linestyle="--", linewidth=1.2, label=panel.level_label)
+    if block.shape[1] > 1 or panel.level is not None:
+        _legend(axes, block.shape[1] + 1)
 
 
 def _tracked(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
