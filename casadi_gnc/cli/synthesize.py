@@ -40,9 +40,19 @@ def _print(title: str, found: dict[str, Any]) -> None:
     if found.get("norm"):
         typer.echo(f"H-infinity norm: certified {found['promised_norm']:.4g}, true {found['norm']['upper']:.4g}")
     if found.get("peak"):
-        typer.echo(f"peak command: {found['peak']['bound']:.4g} of {found['peak']['limit']:.4g}")
+        limit = found["peak"]["limit"]
+        asked = "no limit given" if limit is None else f"limit {limit:.4g}"
+        typer.echo(f"peak command from the worst start: at most {found['peak']['bound']:.4g}, {asked}")
+    if found.get("stable_ratios"):
+        low, high = found["stable_ratios"]
+        typer.echo(f"stable for (assumed mass)/(true mass) {_range(low, high)}")
     if found.get("poles_rad_s"):
         slowest = max(pole[0] for pole in found["poles_rad_s"])
         typer.echo(f"slowest pole: {slowest:.4g} rad/s")
     for one in found["constraints"]:
         typer.echo(f"  {one['name']}: smallest eigenvalue {one['smallest']:.3g}, asked for {one['margin']:.3g}")
+
+
+def _range(low: float | None, high: float | None) -> str:
+    upper = "without an upper end" if high is None else f"below {high:.4g}"
+    return upper if low is None else f"above {low:.4g}, {upper}"

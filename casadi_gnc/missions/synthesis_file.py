@@ -21,6 +21,17 @@ from casadi_gnc.missions.toml_place import describe
 Table = Annotated[list[list[float]], Field(min_length=1)]
 
 
+HalfWidths = Annotated[
+    list[NonNegative] | None, Field(description="of a box of starts of the state about zero, instead of vertices")
+]
+
+
+def _one_of_starts(part: Any) -> Any:
+    if part.vertices is not None and part.half_widths is not None:
+        raise ValueError("give either vertices or half_widths, not both")
+    return part
+
+
 class StateFeedback(Part):
     """u = -K x with the smallest H-infinity norm from w to z = C x + D u + F w."""
 
@@ -34,7 +45,14 @@ class StateFeedback(Part):
     gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
     slack: Positive = 0.02
     margin: Positive = 1e-7
-    fastest_rad_s: Positive | None = None
+    fastest_rad_s: Positive | None = Field(default=None, description="largest distance of a pole from zero")
+    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
+    half_widths: HalfWidths = None
+    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
+
+    @model_validator(mode="after")
+    def _starts(self) -> StateFeedback:
+        return _one_of_starts(self)
 
 
 class Observer(Part):
@@ -49,7 +67,7 @@ class Observer(Part):
     gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
     slack: Positive = 0.02
     margin: Positive = 1e-7
-    fastest_rad_s: Positive | None = None
+    fastest_rad_s: Positive | None = Field(default=None, description="largest distance of a pole from zero")
 
 
 class InputEllipsoid(Part):
@@ -59,17 +77,17 @@ class InputEllipsoid(Part):
     A: Table
     B: Table
     vertices: Table | None = Field(default=None, description="starts, one a row; or give half_widths")
-    half_widths: list[NonNegative] | None = Field(default=None, description="of a box of starts about zero")
+    half_widths: HalfWidths = None
     limit: Positive
     decay_1_s: NonNegative
     per_channel: bool = False
     margin: Positive = 1e-7
 
     @model_validator(mode="after")
-    def _one(self) -> InputEllipsoid:
-        if (self.vertices is None) == (self.half_widths is None):
-            raise ValueError("give either vertices or half_widths, not both")
-        return self
+    def _starts(self) -> InputEllipsoid:
+        if self.vertices is None and self.half_widths is None:
+            raise ValueError("give vertices or half_widths: the starts from which the command is kept small")
+        return _one_of_starts(self)
 
 
 class IntermediateObserver(Part):
@@ -83,6 +101,13 @@ class IntermediateObserver(Part):
     s: Positive = Field(default=0.3, description="where X1^2 is replaced by its tangent")
     margin: Positive = 1e-6
     largest_gamma: Positive = 1e4
+    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
+    half_widths: HalfWidths = None
+    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
+
+    @model_validator(mode="after")
+    def _starts(self) -> IntermediateObserver:
+        return _one_of_starts(self)
 
 
 class Theorem1(Part):
@@ -98,6 +123,7 @@ class Theorem1(Part):
     limit: Positive
     start: Annotated[list[Positive], Field(min_length=3, max_length=3)]
     kappa3: Positive
+    price: NonNegative = Field(default=0.0, description="of the squares of W and H, added to gamma_2")
     margin: Positive = 1e-6
 
 
@@ -148,8 +174,8 @@ def _array(value: Any, place: str) -> Any:
 def synthesize(case: SynthesisCase, backend: str | None = None) -> dict[str, Any]:
     """Return what a recipe found, as plain data with its certificate.
 
-    Keys: status, sentence, certified, gains (empty unless certified), promised and true norm, poles,
-    peak, and every constraint with its smallest eigenvalue.
+    Keys: status, sentence, certified, gains (empty unless certified), promised and true norm, poles, peak
+    command, tolerated (assumed mass) / (true mass), and every constraint with its smallest eigenvalue.
 
     Raises
     ------
@@ -181,9 +207,22 @@ def synthesize(case: SynthesisCase, backend: str | None = None) -> dict[str, Any
     data["promised_norm"] = _finite(found.promised)
     data["poles_rad_s"] = [[float(pole.real), float(pole.imag)] for pole in found.poles]
     if found.norm is not None:
-        data["norm"] = {"lower": _finite(found.norm.lower), "upper": _finite(found.norm.upper)}
+        where = _finite(found.norm.frequency_rad_s)
+        data["norm"] = {
+            "lower": _finite(found.norm.lower),
+            "upper": _finite(found.norm.upper),
+            "frequency_rad_s": where,
+        }
     if found.peak is not None:
-        data["peak"] = {"bound": _finite(found.peak.bound), "limit": _finite(found.limit)}
+        data["peak"] = {
+            "value": _finite(found.peak.value),
+            "bound": _finite(found.peak.bound),
+            "limit": _finite(found.limit),
+            "start": found.peak.start.tolist(),
+            "time_s": found.peak.time_s,
+        }
+    if found.ratios is not None:
+        data["stable_ratios"] = [_finite(end) for end in found.ratios]
     return data
 
 
@@ -196,8 +235,15 @@ def _inequalities(answer: Any) -> dict[str, Any]:
         "gains": {},
         "backend": answer.backend,
         "conflict": list(answer.conflict),
+        "multipliers": answer.infeasibility.shares if answer.infeasibility else {},
         "constraints": [
-            {"name": one.name, "smallest": _finite(one.smallest), "margin": one.margin, "holds": bool(one.holds)}
+            {
+                "name": one.name,
+                "smallest": _finite(one.smallest),
+                "rounding": _finite(one.allowance),
+                "margin": one.margin,
+                "holds": bool(one.holds),
+            }
             for one in answer.checks
         ],
     }

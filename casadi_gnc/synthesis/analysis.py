@@ -142,7 +142,8 @@ def stable_ratios(fixed: Any, scaled: Any, *, around: float = 1.0) -> tuple[floa
     Notes
     -----
     At an end of the interval two eigenvalues add up to zero, so the Lyapunov operator
-    X -> A X + X A' on symmetric X is singular: the ends are eigenvalues, no ratio is sampled.
+    X -> A X + X A' on symmetric X is singular: the ends are among its eigenvalues, and between two of
+    those the loop is stable everywhere or nowhere, so one ratio there tells.
 
     Examples
     --------
@@ -154,13 +155,22 @@ def stable_ratios(fixed: Any, scaled: Any, *, around: float = 1.0) -> tuple[floa
     fits("fixed", fixed, len(fixed), len(fixed))
     fits("scaled", scaled, *fixed.shape)
     middle = _lyapunov(fixed + around * scaled)
-    if poles(fixed + around * scaled)[0].real >= 0:
+
+    def stable(ratio: float) -> bool:
+        return bool(poles(fixed + ratio * scaled)[0].real < 0)
+
+    if not stable(around):
         raise SynthesisError(f"the loop is unstable at the ratio {around:g}; start from a ratio where it is stable")
     inverse = np.linalg.eigvals(-np.linalg.solve(middle, _lyapunov(scaled)))
     size = np.max(np.abs(inverse), initial=0.0)
     real = inverse[(np.abs(inverse.imag) <= 1e-7 * size) & (np.abs(inverse) > 1e-12 * size)].real
-    ends = around + 1 / real
-    return float(max(ends[ends < around], default=-np.inf)), float(min(ends[ends > around], default=np.inf))
+    steps, found = 1 / real, []
+    for sign in (-1.0, 1.0):
+        lengths = np.sort(np.abs(steps[np.sign(steps) == sign]))
+        beyond = np.append((lengths[1:] + lengths[:-1]) / 2, 2 * lengths[-1:])
+        left = (end for end, there in zip(lengths, beyond, strict=True) if not stable(around + sign * there))
+        found.append(around + sign * float(next(left, np.inf)))
+    return found[0], found[1]
 
 
 def _lyapunov(A: np.ndarray) -> np.ndarray:

@@ -59,6 +59,7 @@ class LmiAnswer:
     infeasibility, ray : proofs that there is no point, or no minimum; else None.
     conflict : names of constraints that cannot be met together although any others of them can;
         empty if not sought.
+    far : names of unknowns far beyond their natural size: the minimum may not be attained.
     backend, iterations, seconds, claim : the solver's name and what it said.
     """
 
@@ -75,6 +76,7 @@ class LmiAnswer:
     seconds: float
     claim: Claim
     conflict: tuple[str, ...] = field(default=())
+    far: tuple[str, ...] = field(default=())
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return an unknown; raise `SynthesisError` if it is not certified, or not there."""
@@ -97,6 +99,8 @@ class LmiAnswer:
                 f"{said} The worst is {worst.name!r}: smallest eigenvalue or element {worst.smallest:.3g} "
                 f"where {worst.margin:.3g} was asked for (rounding {worst.allowance:.1g})."
             )
+        if self.status.holds and self.far:
+            said += f" {', '.join(self.far)} may run to infinity: add a constraint that bounds them, or price them."
         if self.infeasibility is not None:
             carried = [f"{name!r} {share:.0%}" for name, share in self.infeasibility.shares.items() if share > 0.01]
             said += f" The multipliers lie on {', '.join(carried)}."
@@ -124,10 +128,12 @@ class Verdict:
 
     @property
     def rank(self) -> tuple[int, float]:
-        """Order verdicts: proofs before points that hold before others; the smaller gap first."""
+        """Order verdicts: proofs, then points that hold, the smaller gap first, then points that lack least."""
         if self.status in (LmiStatus.INFEASIBLE, LmiStatus.UNBOUNDED, LmiStatus.CERTIFIED):
             return 3, 0.0
-        return (2 if self.status is LmiStatus.FEASIBLE else int(self.status is LmiStatus.NOT_CERTIFIED)), -self.gap
+        if self.status is LmiStatus.FEASIBLE:
+            return 2, -self.gap
+        return (1, -max(one.lacking for one in self.checks)) if self.checks else (0, 0.0)
 
 
 def judge(scaled: Scaled, found: Found) -> Verdict:

@@ -97,22 +97,48 @@ def values(data: ConicData, point: np.ndarray) -> dict[str, np.ndarray]:
 def check(data: ConicData, point: np.ndarray) -> tuple[Check, ...]:
     """Return what every constraint is worth at a point, (N,), in original units."""
     here = values(data, point)
-    size = abs(data.matrix) @ np.abs(point) + np.abs(data.offset)
+    rounding = _EPS * (abs(data.matrix) @ np.abs(point) + np.abs(data.offset))
     terms = int(np.max(np.diff(data.matrix.indptr), initial=0)) + 2
     found = []
     for block in data.blocks:
-        rounding = _EPS * size[block.rows]
+        value, doubt = here[block.name], terms * rounding[block.rows]
         if block.kind is Kind.SEMIDEFINITE:
-            smallest = float(np.linalg.eigvalsh(here[block.name])[0])
-            spread = np.abs(from_triangle(rounding, block.size)).sum(axis=1).max()  # bounds the 2-norm
-            allowance = (terms + 4 * block.size) * spread
+            smallest, allowance = _smallest_eigenvalue(value, from_triangle(doubt, block.size), terms)
         elif block.kind is Kind.NONNEGATIVE:
-            smallest, allowance = float(np.min(here[block.name])), terms * float(np.max(rounding))
+            worst = int(np.argmin(value - doubt if block.margin > 0 else value + doubt))
+            smallest, allowance = float(value[worst]), float(doubt[worst])
         else:  # the answer was projected on the equalities by least squares
-            smallest = -float(np.max(np.abs(here[block.name])))
-            allowance = 100 * terms * float(np.max(rounding))
-        found.append(Check(block.name, block.kind, smallest, block.margin, float(allowance)))
+            smallest, allowance = -float(np.max(np.abs(value))), 100 * float(np.max(doubt))
+        found.append(Check(block.name, block.kind, smallest, block.margin, allowance))
     return tuple(found)
+
+
+def _smallest_eigenvalue(matrix: np.ndarray, doubt: np.ndarray, terms: int) -> tuple[float, float]:
+    """Return the smallest eigenvalue, or a Rayleigh quotient that is not positive, and its allowance.
+
+    Parameters
+    ----------
+    matrix : (m, m), symmetric. doubt : (m, m), bound on the rounding of its entries.
+    terms : of the sum in an entry.
+
+    Notes
+    -----
+    Rows may be many decades apart: S = D N D, D diagonal of powers of two, has the size of one, so its
+    eigenvalues are known to e = |D doubt D|, a few roundings. If its smallest, s, exceeds e, the true
+    matrix is above (1 - e/s) N, and the smallest eigenvalue of N is 1/|L^-1 D|^2 with S = L L'.
+    Else v with v'S v <= e gives the direction D v in which N is not positive beyond doubt.
+    """
+    size = np.diag(doubt) / (_EPS * terms)
+    D = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0)) / 2))
+    S = matrix * np.outer(D, D)
+    scaled = doubt * np.outer(D, D)
+    e = float((scaled + 4 * len(D) / terms * scaled).sum(axis=1).max())  # bounds the 2-norm; eigh rounds as much
+    found, vectors = np.linalg.eigh(S)
+    if found[0] > e:
+        smallest = 1 / float(np.linalg.norm(np.linalg.inv(np.linalg.cholesky(S)) * D, 2)) ** 2
+        return smallest, smallest * e / float(found[0])
+    length = float(np.sum((D * vectors[:, 0]) ** 2))
+    return float(found[0]) / length, e / length
 
 
 def onto_equalities(scaled: Scaled, y: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -83,7 +83,7 @@ class ConicData:
         weight = np.ones(len(self.offset))
         for block in self.blocks:
             if block.kind is Kind.SEMIDEFINITE:
-                row, column = np.tril_indices(block.size)
+                row, column = triangle(block.size)
                 weight[block.rows] = np.where(row == column, 1.0, np.sqrt(2.0))
         return weight
 
@@ -93,7 +93,7 @@ class ConicData:
         right = self.offset.copy()
         for block in self.blocks:
             if block.kind is Kind.SEMIDEFINITE:
-                row, column = np.tril_indices(block.size)
+                row, column = triangle(block.size)
                 right[block.rows] -= block.margin * (row == column)
             else:
                 right[block.rows] -= block.margin
@@ -110,22 +110,28 @@ class ConicData:
         return replace(self, blocks=tuple(moved), matrix=self.matrix[rows], offset=self.offset[rows])
 
 
+@lru_cache(maxsize=64)
+def triangle(size: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return rows and columns of the entries of a lower triangle, row by row; do not write to them."""
+    return np.tril_indices(size)
+
+
 def triangle_count(size: int) -> int:
     """Return the number of entries of a triangle."""
     return size * (size + 1) // 2
 
 
-def from_triangle(triangle: np.ndarray, size: int) -> np.ndarray:
+def from_triangle(entries: np.ndarray, size: int) -> np.ndarray:
     """Return the symmetric matrix, (size, size), of a lower triangle row by row."""
     matrix = np.zeros((size, size))
-    row, column = np.tril_indices(size)
-    matrix[row, column] = matrix[column, row] = triangle
+    row, column = triangle(size)
+    matrix[row, column] = matrix[column, row] = entries
     return matrix
 
 
 def to_triangle(matrix: np.ndarray) -> np.ndarray:
     """Return the lower triangle, row by row, of a symmetric matrix."""
-    return matrix[np.tril_indices(len(matrix))]
+    return matrix[triangle(len(matrix))]
 
 
 def into_cone(data: ConicData, dual: np.ndarray) -> np.ndarray:

@@ -15,10 +15,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from casadi_gnc.errors import SynthesisError
-from casadi_gnc.synthesis.conic import Block, ConicData, Kind
+from casadi_gnc.synthesis.conic import Block, ConicData, Kind, triangle
 
 _ORDER = {Kind.EQUAL: 0, Kind.NONNEGATIVE: 1, Kind.SEMIDEFINITE: 2}
 _ROUNDING = 1e-11  # of the largest coefficient: how far mirrored entries may differ by rounding
+_TEXT = 160  # characters of a term that a message prints
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +32,12 @@ class Constraint:
     margin: float
 
 
-def extract(unknowns: ca.SX, constraints: Sequence[Constraint], objective: ca.SX) -> ConicData:
+def extract(unknowns: ca.SX, labels: tuple[str, ...], constraints: Sequence[Constraint], objective: ca.SX) -> ConicData:
     """Return the conic data of constraints.
 
     Parameters
     ----------
-    unknowns : (N,), SX, all scalar unknowns.
+    unknowns : (N,), SX, all scalar unknowns. labels : (N,), their names.
     constraints : in any order.
     objective : scalar SX, minimised.
 
@@ -46,73 +47,57 @@ def extract(unknowns: ca.SX, constraints: Sequence[Constraint], objective: ca.SX
         For an expression that is not affine, not symmetric, not finite, or holds foreign symbols.
     """
     ordered = sorted(constraints, key=lambda constraint: _ORDER[constraint.kind])
-    parts = [ca.densify(constraint.expression) for constraint in ordered]
-    stacked = ca.vertcat(*[ca.vec(part) for part in parts], objective)
+    stacked = ca.vertcat(*[ca.vec(ca.densify(constraint.expression)) for constraint in ordered], objective)
     jacobian = ca.jacobian(stacked, unknowns)
-    _no_foreign(stacked, unknowns, ordered, objective)
-    if not jacobian.is_constant():
+    at_zero = ca.substitute(stacked, unknowns, ca.DM.zeros(*unknowns.shape))
+    if not (jacobian.is_constant() and at_zero.is_constant()):
+        _refuse_foreign(unknowns, ordered, objective)
         _refuse_nonlinear(jacobian, unknowns, ordered, stacked)
-    coefficients: Any = sp.csr_matrix(ca.evalf(jacobian).sparse())
-    constants = np.array(ca.evalf(ca.substitute(stacked, unknowns, ca.SX.zeros(*unknowns.shape)))).ravel()
-    labels = tuple(str(unknowns[i]) for i in range(unknowns.numel()))
-    blocks, picked, first, start = [], [], 0, 0
-    for constraint, part in zip(ordered, parts, strict=True):
-        rows = np.arange(first, first + part.numel())
-        _finite(constraint.name, coefficients[rows], constants[rows])
-        size = part.numel()
+    entries: Any = ca.evalf(jacobian).sparse().tocoo()
+    constants = np.array(ca.evalf(at_zero)).ravel()
+    if not (np.all(np.isfinite(entries.data)) and np.all(np.isfinite(constants))):
+        _refuse_infinite(entries, constants, ordered)
+    blocks, chosen, mirrored, first, start = [], [], [], 0, 0
+    for constraint in ordered:
+        count = size = constraint.expression.numel()
+        row = column = np.arange(count)
         if constraint.kind is Kind.SEMIDEFINITE:
-            size = part.shape[0]
-            lower, upper = _triangles(rows, size)
-            _symmetric(constraint.name, coefficients, constants, lower, upper, size, labels)
-            rows = lower
+            size = constraint.expression.shape[0]
+            i, j = triangle(size)
+            row, column = i + size * j, j + size * i  # column-major, as `vec` stacks
         block = Block(constraint.name, constraint.kind, size, start, constraint.margin)
         blocks.append(block)
-        picked.append(rows)
-        first, start = first + part.numel(), start + block.count
-    _finite("objective", coefficients[[first]], constants[[first]])
-    chosen = np.concatenate(picked).astype(int)
-    cost = np.asarray(coefficients[[first]].todense()).ravel()
-    return ConicData(tuple(blocks), coefficients[chosen], constants[chosen], cost, float(constants[first]), labels)
+        chosen.append(first + row)
+        mirrored.append(first + column)
+        first, start = first + count, start + block.count
+    lower, upper = np.concatenate(chosen), np.concatenate(mirrored)
+    matrix, mirror = _rows(entries, lower), _rows(entries, upper)
+    _symmetric(blocks, matrix, mirror, constants[lower], constants[upper], labels)
+    cost = _rows(entries, np.array([first])).toarray()[0]
+    return ConicData(tuple(blocks), matrix, constants[lower], cost, float(constants[first]), labels)
 
 
-def _triangles(rows: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows of the lower triangle, row by row, and of its mirror image (column-major)."""
-    row, column = np.tril_indices(size)
-    return rows[row + size * column], rows[column + size * row]
+def _rows(entries: Any, rows: np.ndarray) -> sp.csr_matrix:
+    """Return some rows of a matrix in triplets, each asked for once."""
+    place = np.full(entries.shape[0], -1)
+    place[rows] = np.arange(len(rows))
+    moved = place[entries.row]
+    kept = moved >= 0
+    return sp.csr_matrix((entries.data[kept], (moved[kept], entries.col[kept])), shape=(len(rows), entries.shape[1]))
 
 
 def _place(row: int, ordered: Sequence[Constraint]) -> tuple[str, str]:
     """Return the sentence's subject and the entry for a stacked row."""
     for constraint in ordered:
-        count = constraint.expression.numel()
+        count, height = constraint.expression.numel(), constraint.expression.shape[0]
         if row < count:
-            return f"constraint {constraint.name!r}", f"entry ({row % constraint.expression.shape[0]}, " + (
-                f"{row // constraint.expression.shape[0]})"
-            )
+            return f"constraint {constraint.name!r}", f"entry ({row % height}, {row // height})"
         row -= count
     return "the objective", "it"
 
 
-def _refuse_nonlinear(jacobian: ca.SX, unknowns: ca.SX, ordered: Sequence[Constraint], stacked: ca.SX) -> None:
-    rows, columns = jacobian.sparsity().get_triplet()
-    for k in range(jacobian.nnz()):
-        entry = jacobian.nz[k]
-        if entry.is_constant():
-            continue
-        where, what = _place(rows[k], ordered)
-        one, others = str(unknowns[columns[k]]), [str(symbol) for symbol in ca.symvar(entry)]
-        text = str(stacked[rows[k]])
-        text = text if len(text) <= 120 else text[:117] + "..."
-        raise SynthesisError(
-            f"{where} is not affine: {what} multiplies {one} by {' and '.join(others)}, in {text}; "
-            "substitute a product of unknowns (W = K X) or fix one factor and bisect on it"
-        )
-
-
-def _no_foreign(stacked: ca.SX, unknowns: ca.SX, ordered: Sequence[Constraint], objective: ca.SX) -> None:
+def _refuse_foreign(unknowns: ca.SX, ordered: Sequence[Constraint], objective: ca.SX) -> None:
     known = {symbol.element_hash() for symbol in ca.symvar(unknowns)}
-    if all(symbol.element_hash() in known for symbol in ca.symvar(stacked)):
-        return
     for name, expression in [
         *[(f"constraint {c.name!r}", c.expression) for c in ordered],
         ("the objective", objective),
@@ -125,34 +110,68 @@ def _no_foreign(stacked: ca.SX, unknowns: ca.SX, ordered: Sequence[Constraint], 
             )
 
 
-def _finite(name: str, coefficients: Any, constants: np.ndarray) -> None:
-    if not (np.all(np.isfinite(coefficients.data)) and np.all(np.isfinite(constants))):
-        raise SynthesisError(f"constraint {name!r} holds a number that is not finite; check the data it is built from")
+def _refuse_nonlinear(jacobian: ca.SX, unknowns: ca.SX, ordered: Sequence[Constraint], stacked: ca.SX) -> None:
+    rows, _ = jacobian.sparsity().get_triplet()
+    entry = next(rows[k] for k in range(jacobian.nnz()) if not jacobian.nz[k].is_constant())
+    where, what = _place(entry, ordered)
+    for term in _terms(stacked[entry]):
+        slope = ca.jacobian(term, unknowns)
+        if slope.is_constant():
+            continue
+        k = next(k for k in range(slope.nnz()) if not slope.nz[k].is_constant())
+        one = str(unknowns[slope.sparsity().get_triplet()[1][k]])
+        others = " and ".join(str(symbol) for symbol in ca.symvar(slope.nz[k]))
+        text = str(term) if len(str(term)) <= _TEXT else str(term)[: _TEXT - 3] + "..."
+        raise SynthesisError(
+            f"{where} is not affine: {what} holds the term {text}, whose slope by {one} depends on {others}; "
+            "substitute a product of unknowns (W = K X) or fix one factor and bisect on it"
+        )
+
+
+def _terms(expression: ca.SX) -> list[ca.SX]:
+    """Return the terms of a scalar sum, in order."""
+    terms, waiting = [], [expression]
+    while waiting:
+        one = waiting.pop()
+        if one.is_op(ca.OP_ADD) or one.is_op(ca.OP_SUB):
+            waiting += [one.dep(1), one.dep(0)]
+        elif one.is_op(ca.OP_NEG):
+            waiting.append(one.dep(0))
+        else:
+            terms.append(one)
+    return terms
+
+
+def _refuse_infinite(entries: Any, constants: np.ndarray, ordered: Sequence[Constraint]) -> None:
+    bad = np.concatenate([np.flatnonzero(~np.isfinite(constants)), entries.row[~np.isfinite(entries.data)]])
+    where, what = _place(int(bad.min()), ordered)
+    raise SynthesisError(f"{where}: {what} holds a number that is not finite; check the data it is built from")
 
 
 def _symmetric(
-    name: str,
-    coefficients: Any,
-    constants: np.ndarray,
-    lower: np.ndarray,
-    upper: np.ndarray,
-    size: int,
+    blocks: Sequence[Block],
+    lower: sp.csr_matrix,
+    upper: sp.csr_matrix,
+    constant: np.ndarray,
+    mirrored: np.ndarray,
     labels: tuple[str, ...],
 ) -> None:
     """Refuse a matrix whose mirrored entries differ by more than rounding."""
-    largest = max(abs(coefficients[lower]).max(), np.max(np.abs(constants[lower]), initial=0.0))
-    difference = abs(coefficients[lower] - coefficients[upper]).tocoo()
-    offsets = np.abs(constants[lower] - constants[upper])
-    row, column = np.tril_indices(size)
-    if difference.nnz and difference.data.max() > _ROUNDING * largest:
-        worst = int(np.argmax(difference.data))
-        entry, term = difference.row[worst], f"in the coefficient of {labels[difference.col[worst]]}"
-    elif offsets.max(initial=0.0) > _ROUNDING * largest:
-        entry, term = int(np.argmax(offsets)), "in the constant term"
-    else:
+    offsets, difference = np.abs(constant - mirrored), abs(lower - upper)
+    if not (np.any(offsets) or np.any(difference.data)):
         return
-    raise SynthesisError(
-        f"constraint {name!r} is not symmetric: entries ({row[entry]}, {column[entry]}) and "
-        f"({column[entry]}, {row[entry]}) differ {term}; write B @ W + (B @ W).T, "
-        "or give blocks above the diagonal to block_matrix"
-    )
+    for block in blocks:
+        largest = max(abs(lower[block.rows]).max(), np.max(np.abs(constant[block.rows]), initial=0.0))
+        slopes, offset = difference[block.rows].tocoo(), offsets[block.rows]
+        if slopes.nnz and slopes.data.max() > _ROUNDING * largest:
+            worst = int(np.argmax(slopes.data))
+            entry, term = slopes.row[worst], f"in the coefficient of {labels[slopes.col[worst]]}"
+        elif offset.max() > _ROUNDING * largest:
+            entry, term = int(np.argmax(offset)), "in the constant term"
+        else:
+            continue
+        row, column = (int(index[entry]) for index in triangle(block.size))
+        raise SynthesisError(
+            f"constraint {block.name!r} is not symmetric: entries ({row}, {column}) and ({column}, {row}) differ "
+            f"{term}; write B @ W + (B @ W).T, or give blocks above the diagonal to block_matrix"
+        )

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Any
 
 import numpy as np
 
 from casadi_gnc.errors import SynthesisError
-from casadi_gnc.synthesis.analysis import Norm, poles
+from casadi_gnc.synthesis.analysis import Norm, fits, matrices, poles, stable_ratios
 from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus
-from casadi_gnc.synthesis.peak import Peak
+from casadi_gnc.synthesis.peak import Peak, peak_command
 
 #: Poles faster than this multiple of the plant's own rates: the gain runs to infinity.
 RUNAWAY = 1e4
@@ -22,7 +23,7 @@ class GainStatus(Enum):
     CERTIFIED = "The gains keep what they promise: inequalities, poles, norm and peak recomputed from the data."
     INFEASIBLE = "No gains meet the inequalities."
     UNBOUNDED = "The inequalities leave the objective without a bound."
-    RUNS_AWAY = "The optimum is not attained, the gain runs to infinity; give fastest_rad_s, or a price on the command."
+    RUNS_AWAY = "The optimum is not attained, the gain runs to infinity: a bound is missing."
     NOT_CERTIFIED = "The solver's answer does not keep the inequalities; no gain is returned."
     UNSTABLE = "The closed loop has a pole that is not in the left half plane."
     NORM_EXCEEDED = "The closed loop's H-infinity norm is larger than the certified bound."
@@ -51,7 +52,11 @@ class Synthesis:
     promised : bound on the H-infinity norm that the inequalities imply; NaN if they imply none.
     norm : true norm of the closed loop; None if it was not asked.
     poles : (n,), of the closed loop, [rad/s].
-    peak : of the command, with its limit in `limit`; None if it was not asked.
+    peak : of the command from the worst start, by simulation; None if no starts were given.
+    limit : of the command; NaN if none was given.
+    ratios : interval of r = (assumed mass) / (true mass), or of any factor of the input matrix, about one
+        within which the loop stays stable; None where the loop does not hold the input matrix.
+    missing : what would bound a gain that runs away.
     """
 
     status: GainStatus
@@ -62,6 +67,8 @@ class Synthesis:
     poles: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=complex))
     peak: Peak | None = None
     limit: float = float("nan")
+    ratios: tuple[float, float] | None = None
+    missing: str = ""
 
     @property
     def is_certified(self) -> bool:
@@ -85,7 +92,8 @@ class Synthesis:
             return f"{said} It is {self.norm.upper:.4g} {where}, promised {self.promised:.4g}."
         if self.status is GainStatus.UNSTABLE or self.status is GainStatus.RUNS_AWAY:
             slowest, fastest = self.poles[0], self.poles[np.argmax(np.abs(self.poles))]
-            return f"{said} Slowest pole {slowest:.3g}, fastest {fastest:.3g} rad/s."
+            found = f"{said} Slowest pole {slowest:.3g}, fastest {fastest:.3g} rad/s."
+            return f"{found} {self.missing}" if self.missing and self.status is GainStatus.RUNS_AWAY else found
         if self.status is GainStatus.INPUT_EXCEEDED and self.peak is not None:
             return f"{said} It may reach {self.peak.bound:.4g} at {self.peak.time_s:.3g} s, limit {self.limit:.4g}."
         return said
@@ -106,6 +114,8 @@ def certify_gains(
     norm: Norm | None = None,
     peak: Peak | None = None,
     limit: float = float("nan"),
+    parts: tuple[np.ndarray, np.ndarray] | None = None,
+    missing: str = "",
 ) -> Synthesis:
     """Return the synthesis with the first failure as its status.
 
@@ -113,6 +123,9 @@ def certify_gains(
     ----------
     loop : (n, n), the closed loop's matrix, built from the gains and the plant's data.
     rate : the plant's own, [rad/s], against which a gain that runs away is measured.
+    parts : (n, n) twice, the loop is fixed + r scaled for a plant whose input matrix is r times the
+        assumed one; see `stable_ratios`.
+    promised, norm, peak, limit, missing : as in `Synthesis`.
     """
     if not lmis.status.holds:
         return failed(lmis)
@@ -124,9 +137,36 @@ def certify_gains(
         status = GainStatus.RUNS_AWAY
     elif norm is not None and not norm.upper <= promised:
         status = GainStatus.NORM_EXCEEDED
-    elif peak is not None and not peak.bound <= limit:
+    elif peak is not None and peak.bound > limit:
         status = GainStatus.INPUT_EXCEEDED
-    return Synthesis(status, candidate, lmis, promised, norm, found, peak, limit)
+    tolerated = None
+    if parts is not None and status not in (GainStatus.UNSTABLE, GainStatus.RUNS_AWAY):
+        tolerated = stable_ratios(*parts)
+    return Synthesis(status, candidate, lmis, promised, norm, found, peak, limit, tolerated, missing)
+
+
+def peak_from(
+    loop: np.ndarray, command: np.ndarray, vertices: Any, rate: float, *, per_channel: bool = False
+) -> Peak | None:
+    """Return the peak of the command from the worst vertex; None without vertices, or of a loop that is no success."""
+    if vertices is None or not np.all(np.isfinite(loop)):
+        return None
+    found = poles(loop)
+    if found[0].real >= 0 or np.max(np.abs(found)) > RUNAWAY * rate:
+        return None
+    return peak_command(loop, command, vertices, per_channel=per_channel)
+
+
+def starts(vertices: Any, limit: float | None, count: int) -> tuple[np.ndarray | None, float]:
+    """Return checked starts, (V, count), and the limit, NaN for none; raise `SynthesisError`."""
+    if vertices is None and limit is not None:
+        raise SynthesisError(f"limit is {limit} but no starts are given; a command's peak needs vertices to start from")
+    if limit is not None and not (np.isfinite(limit) and limit > 0):
+        raise SynthesisError(f"limit is {limit}, expected a positive number")
+    if vertices is not None:
+        (vertices,) = matrices(vertices=vertices)
+        fits("vertices", vertices, len(vertices), count)
+    return vertices, float("nan") if limit is None else float(limit)
 
 
 def plant_rate(A: np.ndarray, B: np.ndarray) -> float:

@@ -13,12 +13,15 @@ from casadi_gnc.synthesis import backends
 from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus, judge
 from casadi_gnc.synthesis.conic import ConicData, Kind
 from casadi_gnc.synthesis.extraction import Constraint, extract
-from casadi_gnc.synthesis.scaling import scale
-from casadi_gnc.synthesis.unknowns import Unknown, diagonal_index, symmetric_index, unknown
+from casadi_gnc.synthesis.scaling import scale, tightened
+from casadi_gnc.synthesis.unknowns import Unknown, as_sx, diagonal_index, symmetric_index, unknown
 
+_FAR = 1e4  # natural sizes beyond which an unknown may run to infinity
 _MOST_SOUGHT = 24  # constraints among which a smallest conflict is sought by leaving out one after another
-#: Statuses that scaling by the point found may improve.
-_WORTH_ANOTHER_LOOK = (LmiStatus.FEASIBLE, LmiStatus.NOT_CERTIFIED, LmiStatus.UNDECIDED)
+
+_TIGHTER = (4.0, 64.0)  # how many times what a point lacks is asked for on top, if the answer does not hold
+_LACKING = (LmiStatus.NOT_CERTIFIED, LmiStatus.UNDECIDED)
+_WORTH_ANOTHER_LOOK = (LmiStatus.FEASIBLE, *_LACKING)  # scaled by the point found
 
 
 class Lmis:
@@ -79,7 +82,7 @@ class Lmis:
             semidefinite, and only an answer that keeps it to rounding is certified.
         name : for messages and certificates.
         """
-        matrix = ca.SX(expression)
+        matrix = as_sx(expression)
         if matrix.shape[0] != matrix.shape[1]:
             raise SynthesisError(
                 f"constraint {self._name(name)!r} has shape {matrix.shape}, expected a square matrix; check its blocks"
@@ -88,19 +91,19 @@ class Lmis:
 
     def nsd(self, expression: Any, *, margin: float | None = None, name: str | None = None) -> None:
         """Ask that expression + margin I is negative semidefinite; arguments as for `psd`."""
-        self.psd(-ca.SX(expression), margin=margin, name=name)
+        self.psd(-as_sx(expression), margin=margin, name=name)
 
     def nonnegative(self, expression: Any, *, margin: float | None = None, name: str | None = None) -> None:
         """Ask that every element of an affine expression is at least the margin; arguments as for `psd`."""
-        self._add(name, Kind.NONNEGATIVE, ca.SX(expression), margin)
+        self._add(name, Kind.NONNEGATIVE, as_sx(expression), margin)
 
     def equal(self, expression: Any, *, name: str | None = None) -> None:
         """Ask that every element of an affine expression is zero."""
-        self._add(name, Kind.EQUAL, ca.SX(expression), 0.0)
+        self._add(name, Kind.EQUAL, as_sx(expression), 0.0)
 
     def minimize(self, expression: Any) -> None:
         """Set the objective, an affine scalar; by default any point will do."""
-        objective = ca.SX(expression)
+        objective = as_sx(expression)
         if objective.shape != (1, 1):
             raise SynthesisError(f"the objective has shape {objective.shape}, expected a scalar; take its trace or sum")
         self._objective = objective
@@ -128,7 +131,8 @@ class Lmis:
         if not self._unknowns or not self._constraints:
             raise SynthesisError("there are no LMIs yet; declare unknowns and state at least one constraint")
         symbols = ca.vertcat(*[one.symbols for one in self._unknowns.values()])
-        return extract(symbols, list(self._constraints.values()), self._objective)
+        labels = tuple(label for one in self._unknowns.values() for label in one.labels)
+        return extract(symbols, labels, list(self._constraints.values()), self._objective)
 
     def solve(self, backend: Any = "clarabel", *, conflict: bool = True, **options: Any) -> LmiAnswer:
         """Return the certified answer.
@@ -153,17 +157,26 @@ class Lmis:
         """Return the certified answer to conic data of these unknowns, as `data` returns."""
         module = backends.module(backend) if isinstance(backend, str) else backend
         scaled = scale(data)
+        natural = scaled.unit
         try:
             found = module.solve(scaled, **options)
         except TypeError as error:
             raise SynthesisError(f"back end {backend!r}: {error}") from error
         verdict = judge(scaled, found)
         if verdict.status in _WORTH_ANOTHER_LOOK and np.all(np.isfinite(verdict.point)):
-            scaled = scale(data, verdict.point)
-            second = module.solve(scaled, **options)
-            other = judge(scaled, second)
+            by_point = scale(data, verdict.point)
+            second = module.solve(by_point, **options)
+            other = judge(by_point, second)
             if other.rank > verdict.rank:
-                verdict, found = other, second
+                scaled, verdict, found = by_point, other, second
+        for factor in _TIGHTER:
+            if verdict.status not in _LACKING or not np.all(np.isfinite(verdict.point)):
+                break
+            again = module.solve(tightened(scaled, verdict.point / scaled.unit, factor), **options)
+            other = judge(scaled, again)
+            if other.status.holds:
+                verdict, found = other, again
+        far = np.abs(verdict.point) > _FAR * natural
         return LmiAnswer(
             status=verdict.status,
             point=verdict.point,
@@ -177,6 +190,7 @@ class Lmis:
             iterations=found.iterations,
             seconds=found.seconds,
             claim=found.claim,
+            far=tuple(dict.fromkeys(data.labels[i].split("[")[0] for i in np.flatnonzero(far))),
         )
 
     def _matrices(self, point: np.ndarray) -> dict[str, np.ndarray]:

@@ -8,16 +8,18 @@ Solvers scale too, but may not touch single rows of a matrix; the rows are what 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from casadi_gnc.errors import SynthesisError
-from casadi_gnc.synthesis.conic import ConicData, Kind
+from casadi_gnc.synthesis.conic import ConicData, Kind, from_triangle, triangle
 
-_SWEEPS = 12
-_SPREAD = 1e14  # coefficients of a row further apart than this vanish in rounding
+_SWEEPS = 40
+_SETTLED = 0.05  # change of a factor, in its logarithm, that ends the sweeps
+#: Smallest share of a margin in the smallest row of its block, whose own entries are near one.
+LEAST_MARGIN = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +53,6 @@ class Scaled:
         return self.row * z / self.data.weight / self.price
 
 
-def _largest(positions: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    found = np.zeros(count)
-    np.maximum.at(found, positions, values)
-    return np.where(found > 0, found, 1.0)
-
-
 def scale(data: ConicData, around: np.ndarray | None = None) -> Scaled:
     """Return scaled data.
 
@@ -69,69 +65,76 @@ def scale(data: ConicData, around: np.ndarray | None = None) -> Scaled:
     Raises
     ------
     SynthesisError
-        If rounding alone would decide: a margin lost in the size of its block, or coefficients of
-        one block more than fourteen digits apart after scaling.
+        If rounding alone would decide: a margin below the rounding of every row of its block.
     """
     count, unknowns = len(data.offset), len(data.cost)
-    entries = sp.coo_matrix(data.matrix)
-    size, first, second = np.abs(entries.data), np.arange(count), np.arange(count)
-    corners = count  # one factor for each row of each matrix, besides plain rows
-    for block in data.blocks:
+    first, second, corners = np.arange(count), np.arange(count), count
+    single = np.ones(count, dtype=bool)
+    for block in data.blocks:  # one factor for each row of each matrix, besides plain rows
         if block.kind is Kind.SEMIDEFINITE:
-            row, column = np.tril_indices(block.size)
+            row, column = triangle(block.size)
             first[block.rows], second[block.rows] = corners + row, corners + column
+            single[block.rows] = False
             corners += block.size
-    factor, unit = np.ones(corners), np.ones(unknowns)
-    if around is not None and not np.any(around):
-        around = None
-    if around is not None:
-        unit = np.maximum(np.abs(around), 1e-6 * float(np.max(np.abs(around))))
-    offset = np.abs(data.offset)
-    single = np.zeros(count, dtype=bool)
-    for block in data.blocks:
-        single[block.rows] = block.kind is not Kind.SEMIDEFINITE
+    rows, columns = np.repeat(np.arange(count), np.diff(data.matrix.indptr)), data.matrix.indices
+    size, offset = np.abs(data.matrix.data), np.abs(data.offset)
+    places = np.concatenate([first[rows], second[rows], first, second])
+    unit = np.zeros(unknowns) if around is None else np.abs(around)
+    given = bool(np.any(unit))
+    unit = np.maximum(unit, 1e-6 * np.max(unit)) if given else np.ones(unknowns)
     # Constants have no unit of their own: start from those on the diagonals, the sweeps keep what is near one.
     own = np.where(first == second, offset, 0.0)
     factor = 1 / _largest(first, np.where(single, own, np.sqrt(own)), corners)
     for _ in range(_SWEEPS):
-        row = np.where(single, factor[first], factor[first] * factor[second])
-        if around is None:
-            unit = unit / np.sqrt(_largest(entries.col, size * row[entries.row] * unit[entries.col], unknowns))
-        now, still = size * row[entries.row] * unit[entries.col], offset * row
-        both = np.concatenate([now, now, still, still])
-        places = np.concatenate([first[entries.row], second[entries.row], first, second])
-        factor = factor / np.sqrt(_largest(places, both, corners))
-    row = np.where(single, factor[first], factor[first] * factor[second])
-    matrix = sp.csr_matrix(
-        (entries.data * (row * data.weight)[entries.row] * unit[entries.col], (entries.row, entries.col)),
-        shape=(count, unknowns),
-    )
+        row = factor[first] * np.where(single, 1.0, factor[second])
+        now, change = size * row[rows], np.ones(1)
+        if not given:
+            change = np.sqrt(_largest(columns, now * unit[columns], unknowns))
+            unit = unit / change
+        now, still = now * unit[columns], offset * row
+        root = np.sqrt(_largest(places, np.concatenate([now, now, still, still]), corners))
+        factor = factor / root
+        if max(np.max(np.abs(np.log(change))), np.max(np.abs(np.log(root)))) < _SETTLED:
+            break
+    row = factor[first] * np.where(single, 1.0, factor[second])
+    if not given:
+        _refuse_hopeless(data, row)
+    entries = data.matrix.data * (row * data.weight)[rows] * unit[columns]
     cost = data.cost * unit
     largest = float(np.max(np.abs(cost), initial=0.0))
     price = 1 / largest if largest > 0 else 1.0
-    scaled = Scaled(data, matrix, data.right * row * data.weight, price * cost, unit, row, price)
-    if around is None:
-        _refuse_hopeless(scaled)
-    return scaled
+    matrix = sp.csr_matrix((entries, columns, data.matrix.indptr), shape=(count, unknowns))
+    return Scaled(data, matrix, data.right * row * data.weight, price * cost, unit, row, price)
 
 
-def _refuse_hopeless(scaled: Scaled) -> None:
-    data = scaled.data
+def _largest(positions: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    found = np.zeros(count)
+    np.maximum.at(found, positions, values)
+    return np.where(found > 0, found, 1.0)
+
+
+def _refuse_hopeless(data: ConicData, row: np.ndarray) -> None:
     for block in data.blocks:
-        rows = scaled.matrix[block.rows]
-        sizes = np.abs(rows.data[rows.data != 0])
-        if len(sizes) and sizes.max() > _SPREAD * sizes.min():
+        kept = block.margin * float(np.max(row[block.rows][data.weight[block.rows] == 1]))
+        if 0 < kept < LEAST_MARGIN:
             raise SynthesisError(
-                f"constraint {block.name!r} is hopelessly scaled: after equilibration its coefficients still "
-                f"reach from {sizes.min():.1g} to {sizes.max():.1g}; choose units that bring the data nearer to one"
+                f"constraint {block.name!r} is hopelessly scaled: its margin {block.margin:.1g} is {kept:.0e} of the "
+                f"smallest of its rows, and below {LEAST_MARGIN:.0e} rounding decides; enlarge the margin, or choose "
+                "units in which the rows are nearer to it"
             )
-        entries = max(
-            np.max(np.abs(data.matrix[block.rows].data), initial=0.0),
-            np.max(np.abs(data.offset[block.rows]), initial=0),
-        )
-        row = scaled.row[block.rows][scaled.data.weight[block.rows] == 1]
-        if block.margin > 0 and block.margin * row.max(initial=0.0) < 1e-13:
-            raise SynthesisError(
-                f"constraint {block.name!r} is hopelessly scaled: its margin {block.margin:.1g} is lost in "
-                f"coefficients of size {entries:.1g}; choose units nearer to the data, or a larger margin"
-            )
+
+
+def tightened(scaled: Scaled, y: np.ndarray, factor: float) -> Scaled:
+    """Return data that ask of each block more: factor times what it lacks, in scaled units, at a point, (N,).
+
+    For the solver alone: its next answer then keeps what is asked, if its error is no larger than that.
+    """
+    right, values = scaled.right.copy(), scaled.matrix @ y + scaled.right
+    for block in scaled.data.blocks:
+        here, plain = values[block.rows] / scaled.data.weight[block.rows], scaled.data.weight[block.rows] == 1
+        if block.kind is Kind.SEMIDEFINITE:
+            least = float(np.linalg.eigvalsh(from_triangle(here, block.size))[0])
+            right[block.rows] += factor * plain * min(least, 0.0)
+        elif block.kind is Kind.NONNEGATIVE:
+            right[block.rows] += factor * min(float(np.min(here)), 0.0)
+    return replace(scaled, right=right)

@@ -20,12 +20,14 @@ class Unknown:
     name : for the reader.
     expression : SX of the matrix.
     symbols : SX column of the scalar unknowns in it.
+    labels : of the symbols, such as ``X[1,0]``.
     index : (rows, columns), which symbol stands in an entry; -1 for a zero.
     """
 
     name: str
     expression: ca.SX
     symbols: ca.SX
+    labels: tuple[str, ...]
     index: np.ndarray
 
     def value(self, numbers: np.ndarray) -> np.ndarray:
@@ -36,8 +38,9 @@ class Unknown:
 def unknown(name: str, index: np.ndarray) -> Unknown:
     """Return an unknown whose entries are the symbols that an index names; negative is zero."""
     labels = [""] * (int(index.max()) + 1)
-    for row, column in zip(*np.nonzero(index >= 0), strict=True):
-        labels[index[row, column]] = labels[index[row, column]] or f"{name}[{row},{column}]"
+    for (row, column), number in np.ndenumerate(index):
+        if number >= 0 and not labels[number]:
+            labels[number] = f"{name}[{row},{column}]"
     symbols = ca.vertcat(*[ca.SX.sym(label) for label in labels])
     flat = index.ravel(order="F")
     if np.all(flat >= 0):
@@ -46,7 +49,7 @@ def unknown(name: str, index: np.ndarray) -> Unknown:
         expression = ca.SX(*index.shape)
         for row, column in zip(*np.nonzero(index >= 0), strict=True):
             expression[int(row), int(column)] = symbols[int(index[row, column])]
-    return Unknown(name, expression, symbols, index)
+    return Unknown(name, expression, symbols, tuple(labels), index)
 
 
 def symmetric_index(size: int) -> np.ndarray:
@@ -87,14 +90,14 @@ def block_matrix(rows: list[list[Any]]) -> ca.SX:
     """
     count = len(rows)
     full = [[*[None] * (count - len(row)), *row] for row in rows]
-    diagonal = [ca.SX(full[i][i]) if full[i] and full[i][i] is not None else ca.SX(0, 1) for i in range(count)]
+    diagonal = [as_sx(full[i][i]) if full[i] and full[i][i] is not None else ca.SX(0, 1) for i in range(count)]
     for i, block in enumerate(diagonal):
         if block.shape[0] != block.shape[1]:
             raise SynthesisError(
                 f"block ({i}, {i}) has shape {block.shape}, expected a square; blocks on the diagonal set the sizes"
             )
-    result = ca.diagcat(*diagonal)
-    start = np.concatenate([[0], np.cumsum([block.shape[0] for block in diagonal])]).astype(int).tolist()
+    sizes = [block.shape[0] for block in diagonal]
+    grid = [[diagonal[i] if i == j else ca.SX(sizes[i], sizes[j]) for j in range(count)] for i in range(count)]
     for i in range(count):
         for j in range(count):
             given = full[i][j] if j < len(full[i]) else None
@@ -104,11 +107,15 @@ def block_matrix(rows: list[list[Any]]) -> ca.SX:
                 raise SynthesisError(
                     f"block ({i}, {j}) lies below the diagonal; give its transpose as block ({j}, {i})"
                 )
-            block, expected = ca.SX(given), (diagonal[i].shape[0], diagonal[j].shape[0])
+            block, expected = as_sx(given), (sizes[i], sizes[j])
             if block.shape != expected:
                 raise SynthesisError(
                     f"block ({i}, {j}) has shape {block.shape}, expected {expected}; check its factors"
                 )
-            result[start[i] : start[i + 1], start[j] : start[j + 1]] = block
-            result[start[j] : start[j + 1], start[i] : start[i + 1]] = block.T
-    return result
+            grid[i][j], grid[j][i] = block, block.T
+    return ca.vertcat(*[ca.horzcat(*row) for row in grid])
+
+
+def as_sx(block: Any) -> ca.SX:
+    """Return a matrix as SX, without a copy if it is one."""
+    return block if isinstance(block, ca.SX) else ca.SX(block)

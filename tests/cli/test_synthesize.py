@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from casadi_gnc.missions.loading import read
 
@@ -25,9 +26,31 @@ def test_repaired_synthesis_is_certified():
     assert found["promised_norm"] == pytest.approx(3.21, abs=5e-3)
     assert found["norm"]["upper"] == pytest.approx(2.30, abs=5e-3)
     assert all(one["holds"] and one["smallest"] >= 0.5 * one["margin"] for one in found["constraints"])
+    assert all(one["rounding"] < one["smallest"] for one in found["constraints"])
+    assert found["norm"]["lower"] <= found["norm"]["upper"] <= found["promised_norm"]
+    assert max(pole[0] for pole in found["poles_rad_s"]) < 0
     recipe = read("shi2020/synthesis")[2]["recipe"]
     closed = np.array(recipe["A"]) - np.array(recipe["B"]) @ np.array(found["gains"]["K"])
     assert np.linalg.eigvals(closed).real.max() < 0
+    # Simulated apart: the command from the worst vertex, and the loop with the input matrix r times the assumed one.
+    K, L, A, B = (np.array(m) for m in (found["gains"]["K"], found["gains"]["L"], recipe["A"], recipe["B"]))
+
+    def loop(r):
+        known = np.hstack([L, A - L - B @ K, np.zeros((6, 3))])
+        estimate = 200.0 * B.T @ np.hstack([L, -L, np.zeros((6, 3))])
+        return np.vstack([np.hstack([A, -r * B @ K, -r * B]), known, estimate])
+
+    start = np.concatenate([found["peak"]["start"]])
+    assert np.abs(start[:6]).tolist() == [2.0, 3.0, 4.0, 0.0, 0.0, 0.0]
+    path = [
+        np.linalg.norm(np.hstack([np.zeros((3, 6)), K, np.eye(3)]) @ expm(loop(1) * t) @ start)
+        for t in np.linspace(0, 4, 400)
+    ]
+    assert max(path) <= found["peak"]["bound"] <= 1.02 * max(path)
+    assert found["peak"]["limit"] is None
+    low = found["stable_ratios"][0]
+    for r, stable in ((1.001 * low, True), (0.999 * low, False), (1.0, True), (10.0, True)):
+        assert (np.linalg.eigvals(loop(r)).real.max() < 0) == stable
 
 
 @pytest.mark.parametrize("backend", ["clarabel", "barrier"])
@@ -38,6 +61,8 @@ def test_printed_theorem_is_infeasible_and_named(backend):
     assert found["status"] == "INFEASIBLE"
     assert found["gains"] == {}
     assert "(26) input" in found["sentence"]
+    assert found["conflict"] == ["(26) input"]
+    assert next(iter(found["multipliers"])) == "(26) input"  # carries most of the proof
 
 
 def test_text_names_gains_and_constraints():
@@ -45,6 +70,8 @@ def test_text_names_gains_and_constraints():
     assert "K =" in done.stdout
     assert "certified 3.21" in done.stdout
     assert "smallest eigenvalue" in done.stdout
+    assert "peak command from the worst start: at most" in done.stdout
+    assert "stable for (assumed mass)/(true mass) above 0.17" in done.stdout
 
 
 STATE_FEEDBACK = """
@@ -68,6 +95,8 @@ D = [[0.0], [1.0]]
         (("D = [[0.0], [1.0]]", ""), "recipe.D: is missing"),
         (('type = "state_feedback"', 'type = "magic"'), "unknown type 'magic'"),
         (("A = [[0.0, 1.0]", "A = [[nan, 1.0]"), "recipe.A[1][1]"),
+        (("D = ", "limit = 1.0\nD = "), "needs vertices to start from"),
+        (("D = ", "half_widths = [1.0, 1.0]\nvertices = [[1.0, 1.0]]\nD = "), "either vertices or half_widths"),
         (('kind = "synthesis"', 'kind = "mission"'), 'takes a file of kind "synthesis"'),
     ],
 )
@@ -94,6 +123,27 @@ def test_other_recipes_run_from_files(tmp_path):
     found = json.loads(run(str(path), "--json").stdout)
     assert found["certified"]
     assert found["peak"]["bound"] <= 5.0
+
+
+@pytest.mark.parametrize(
+    ("change", "status", "words"),
+    [
+        (("D = [[0.0], [1.0]]", "D = [[0.0], [0.0]]"), "RUNS_AWAY", "z prices 0 of 1 commands"),
+        (("B = [[0.0], [1.0]]", "B = [[0.0], [0.0]]"), "INFEASIBLE", "'bounded real' cannot be met by itself"),
+        (("D = ", "vertices = [[9.0, 0.0]]\nlimit = 1.0\nD = "), "INPUT_EXCEEDED", "limit 1."),
+    ],
+)
+def test_a_synthesis_that_fails_exits_with_1_and_gives_no_gains(tmp_path, change, status, words):
+    path = tmp_path / "fails.toml"
+    assert change[0] in STATE_FEEDBACK
+    path.write_text(STATE_FEEDBACK.replace(*change, 1))
+    done = run(str(path), "--json")
+    found = json.loads(done.stdout)
+    assert done.returncode == 1, done.stderr
+    assert found["status"] == status
+    assert words in found["sentence"]
+    assert not found["certified"]
+    assert found["gains"] == {}
 
 
 def test_unknown_back_end_is_told():

@@ -67,16 +67,25 @@ class _Cone:
         return gradient, hessian
 
 
+def _newton(cone: _Cone, v: np.ndarray, objective: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return Newton's step for objective'v + barrier, and the square of its decrement."""
+    gradient, hessian = cone.derivatives(v)
+    gradient = gradient + objective
+    ridge = 1 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+    direction = -ridge * np.linalg.lstsq(hessian * np.outer(ridge, ridge), ridge * gradient, rcond=1e-15)[0]
+    return direction, -float(gradient @ direction)
+
+
 def _centre(cone: _Cone, v: np.ndarray, objective: np.ndarray, budget: int) -> tuple[np.ndarray, int, bool]:
     """Return the minimiser of objective'v + barrier from an interior point, Newton steps, and success."""
+    last = np.inf
     for step in range(budget):
-        gradient, hessian = cone.derivatives(v)
-        gradient = gradient + objective
-        ridge = 1 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
-        direction = -ridge * np.linalg.lstsq(hessian * np.outer(ridge, ridge), ridge * gradient, rcond=1e-15)[0]
-        decrement = -float(gradient @ direction)
+        direction, decrement = _newton(cone, v, objective)
         if not decrement > 1e-9:
             return v, step, decrement > -1e-9
+        if last < 0.1 and decrement > last / 2:  # Newton's method squares it there: rounding has taken over
+            return v, step, decrement < 1e-6
+        last = decrement
         length = 1.0 if decrement < 0.1 else 1 / (1 + np.sqrt(decrement))
         here = cone.barrier(v)
         while length > 1e-12:
@@ -127,7 +136,8 @@ def solve(scaled: Scaled, *, tolerance: float = 1e-9, max_iterations: int = 600,
             inner, more, _ = _centre(cone, inner, np.zeros(len(inner)), max_iterations - steps)
             steps += more
     if t > 0:
-        dual = _multipliers(scaled, cone, inner, level, t)
+        step = _newton(cone, inner, t * price)[0] if claim is Claim.SOLVED and np.any(price) else None
+        dual = _multipliers(scaled, cone, inner, level, t, step)
         wanted = scaled.cost if claim is Claim.SOLVED and np.any(price) else np.zeros(dense.shape[1])
         dual[equal] = np.linalg.lstsq(rows.T, wanted - dense.T @ dual, rcond=None)[0]
     point = basis @ inner / np.max(np.abs(inner)) if claim is Claim.UNBOUNDED else particular + basis @ inner
@@ -196,6 +206,8 @@ def _second_phase(
     while steps < budget:
         trial, more, good = _centre(cone, y, t * price, budget - steps)
         steps += more + 1
+        if not good and reached > 0:  # the last centre has the better multipliers
+            return y, steps, reached, Claim.SOLVED
         y, reached = trial, t
         if np.max(np.abs(y)) > 1e-3 * _BOX and abs(price @ y) > 1e-6 * _BOX:
             if cone.degree / t < 1e-6 * _BOX:
@@ -206,15 +218,29 @@ def _second_phase(
     return y, steps, reached, Claim.NOTHING
 
 
-def _multipliers(scaled: Scaled, cone: _Cone, y: np.ndarray, level: float, t: float) -> np.ndarray:
-    """Return the barrier's multipliers 1/(t F), (M,), triangles with weights; equalities zero."""
+def _multipliers(
+    scaled: Scaled, cone: _Cone, y: np.ndarray, level: float, t: float, step: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the barrier's multipliers 1/(t F), (M,), triangles with weights; equalities zero.
+
+    With Newton's step they are 1/t (F^-1 - F^-1 dF F^-1), which keep matrix'dual = cost where the point is
+    no exact centre.
+    """
     matrices, rows = cone.values(y)
-    dual, semidefinite, plain = np.zeros(len(scaled.right)), iter(matrices), 0
+    changes = [
+        np.zeros_like(base) if step is None else np.tensordot(step, s, 1)
+        for base, s in zip(cone.bases, cone.slopes, strict=True)
+    ]
+    change = np.zeros_like(rows) if step is None else cone.slope @ step
+    dual, semidefinite, plain = np.zeros(len(scaled.right)), zip(matrices, changes, strict=True), 0
     for block in scaled.data.blocks:
         if block.kind is Kind.SEMIDEFINITE:
-            inverse = np.linalg.inv(next(semidefinite) + level * np.eye(block.size)) / t
-            dual[block.rows] = to_triangle(inverse) * scaled.data.weight[block.rows]
+            matrix, moved = next(semidefinite)
+            inverse = np.linalg.inv(matrix + level * np.eye(block.size))
+            dual[block.rows] = to_triangle(inverse - inverse @ moved @ inverse) / t * scaled.data.weight[block.rows]
         elif block.kind is Kind.NONNEGATIVE:
-            dual[block.rows] = 1 / (t * (rows[plain : plain + block.size] + level))
+            here = slice(plain, plain + block.size)
+            inverse = 1 / (rows[here] + level)
+            dual[block.rows] = (inverse - inverse**2 * change[here]) / t
             plain += block.size
     return dual

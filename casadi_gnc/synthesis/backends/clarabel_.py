@@ -39,7 +39,8 @@ def solve(scaled: Scaled, *, tolerance: float = 1e-10, max_iterations: int = 200
         Kind.SEMIDEFINITE: clarabel.PSDTriangleConeT,
     }
     settings = clarabel.DefaultSettings()
-    settings.verbose = settings.presolve_enable = settings.chordal_decomposition_enable = False
+    settings.verbose = settings.presolve_enable = settings.chordal_decomposition_compact = False
+    settings.equilibrate_enable = False  # the data are scaled, and a second scaling costs it two digits
     settings.max_iter = max_iterations
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     count = len(scaled.cost)

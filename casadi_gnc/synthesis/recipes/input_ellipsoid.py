@@ -24,9 +24,8 @@ import numpy as np
 
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.analysis import fits, matrices
-from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, plant_rate
+from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate
 from casadi_gnc.synthesis.lmis import Lmis
-from casadi_gnc.synthesis.peak import peak_command
 from casadi_gnc.synthesis.unknowns import block_matrix
 
 
@@ -57,7 +56,8 @@ def input_ellipsoid(
     -------
     Synthesis
         With gain "K"; `peak` is the simulated command from the worst vertex, `limit` the limit and
-        `lmis["share"]` the square of the part of it that the ellipsoid needs.
+        `lmis["share"]` the square of the part of it that the ellipsoid needs; `ratios` are factors of B
+        that the loop tolerates.
 
     Raises
     ------
@@ -90,7 +90,13 @@ def input_ellipsoid(
     if not answer.status.holds:
         return failed(answer)
     K = np.linalg.solve(answer["X"], answer["W"].T).T
-    loop = A - B @ K
-    stable = np.max(np.linalg.eigvals(loop).real) < 0
-    peak = peak_command(loop, K, vertices, per_channel=per_channel) if stable else None
-    return certify_gains({"K": K}, answer, loop, plant_rate(A, B), peak=peak, limit=limit)
+    return certify_gains(
+        {"K": K},
+        answer,
+        A - B @ K,
+        plant_rate(A, B),
+        peak=peak_from(A - B @ K, K, vertices, plant_rate(A, B), per_channel=per_channel),
+        limit=limit,
+        parts=(A, -B @ K),
+        missing="Ask for a smaller decay_1_s.",
+    )

@@ -29,8 +29,9 @@ import numpy as np
 
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
+from casadi_gnc.synthesis.answer import LmiAnswer
 from casadi_gnc.synthesis.conic import ConicData
-from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, plant_rate
+from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.unknowns import block_matrix
 
@@ -78,6 +79,8 @@ def intermediate_observer(
     relative: float = 1e-4,
     margin: float = 1e-6,
     largest_gamma: float = 1e4,
+    vertices: Any = None,
+    limit: float | None = None,
     backend: Any = "clarabel",
     **options: Any,
 ) -> Synthesis:
@@ -91,12 +94,16 @@ def intermediate_observer(
     relative : to which gamma is bisected.
     margin : of the inequalities, in their units.
     largest_gamma : where the search for a feasible gamma gives up.
+    vertices : (V, n), starts of eta, the observer at zero, from whose hull the peak of the norm of u is
+        simulated, unclipped; see `box_vertices`.
+    limit : of that peak, which the LMI does not know; larger commands are not certified.
     backend, options : see `casadi_gnc.synthesis.backends`.
 
     Returns
     -------
     Synthesis
-        With gains "K" and "L"; `promised` is gamma, `norm` the true one from (v, wdot) to C eta.
+        With gains "K" and "L"; `promised` is gamma, `norm` the true one from (v, wdot) to C eta, `ratios`
+        the (assumed mass) / (true mass) that the loop tolerates.
 
     Raises
     ------
@@ -114,7 +121,9 @@ def intermediate_observer(
     for name, value in (("varpi", varpi), ("s", s), ("relative", relative)):
         if not (np.isfinite(value) and value > 0):
             raise SynthesisError(f"{name} is {value}, expected a positive number")
-    poses = [_pose(A, B, C, varpi, s, square, margin) for square in (0.0, 1.0)]
+    vertices, most = starts(vertices, limit, n)
+    parts = uncoupled(A, B, C)
+    poses = [_pose(A, B, C, parts, varpi, s, square, margin) for square in (0.0, 1.0)]
     lmis, zero, one = poses[0], poses[0].data(), poses[1].data()
 
     def attempt(gamma: float) -> Any:
@@ -136,11 +145,45 @@ def intermediate_observer(
             low = gamma
     centre = lmis.attempt(_between(zero, one, high**2), "barrier", centre=True)
     best = centre if centre.status.holds else best
-    K = np.linalg.solve(best["X1"], best["W"].T).T
-    L = np.linalg.solve((C @ best["X1"]).T, best["H"].T).T
+    K, L = np.zeros((m, n)), np.zeros((n, n))
+    for part, (states, inputs) in enumerate(parts):
+        X1, W, H = (best[_name(one, part, parts)] for one in ("X1", "W", "H"))
+        K[np.ix_(inputs, states)] = np.linalg.solve(X1, W.T).T
+        L[np.ix_(states, states)] = np.linalg.solve((C[np.ix_(states, states)] @ X1).T, H.T).T
+    return certify_pair(A, B, C, K, L, varpi, best, promised=float(high), vertices=vertices, limit=most)
+
+
+def certify_pair(
+    A: np.ndarray,
+    B: np.ndarray,
+    C: np.ndarray,
+    K: np.ndarray,
+    L: np.ndarray,
+    varpi: float,
+    lmis: LmiAnswer,
+    *,
+    promised: float,
+    vertices: np.ndarray | None = None,
+    limit: float = float("nan"),
+) -> Synthesis:
+    """Return what gains K and L are worth, from the plant's data; arguments as of `intermediate_observer`."""
+    n, m = B.shape
     loop, inputs = closed_loop(A, B, C, K, L, varpi)
-    norm = h_infinity_norm(loop, inputs, np.hstack([C, np.zeros((n, n + m))]))
-    return certify_gains({"K": K, "L": L}, best, loop, plant_rate(A, B), promised=float(high), norm=norm)
+    fixed, scaled = by_mass_ratio(A, B, C, K, L, varpi)
+    command = np.hstack([np.zeros((m, n)), -K, -np.eye(m)])
+    begun = None if vertices is None else np.hstack([vertices, np.zeros((len(vertices), n + m))])
+    return certify_gains(
+        {"K": K, "L": L},
+        lmis,
+        loop,
+        plant_rate(A, B),
+        promised=promised,
+        norm=h_infinity_norm(loop, inputs, np.hstack([C, np.zeros((len(C), n + m))])),
+        peak=peak_from(fixed + scaled, command, begun, plant_rate(A, B)),
+        limit=limit,
+        parts=(fixed, scaled),
+        missing="Choose a smaller s: the gains grow with it.",
+    )
 
 
 def sample_s(A: Any, B: Any, varpi: float, values: Sequence[float], **options: Any) -> dict[float, Synthesis]:
@@ -157,23 +200,60 @@ def _between(zero: ConicData, one: ConicData, square: float) -> ConicData:
     )
 
 
-def _pose(A: np.ndarray, B: np.ndarray, C: np.ndarray, varpi: float, s: float, square: float, margin: float) -> Lmis:
-    n, m = B.shape
-    lmis = Lmis()
-    X1, X3 = lmis.symmetric("X1", n), lmis.symmetric("X3", m)
-    W, H = lmis.rectangular("W", m, n), lmis.rectangular("H", n, n)
-    BB = varpi * B @ B.T
+def loop_rows(A: Any, B: Any, varpi: float, X1: Any, X3: Any, W: Any, H: Any) -> list[list[Any]]:
+    """Return P A_chi + A_chi'P after the congruence with diag(X1, X1, X3): blocks on and above the diagonal."""
+    BB = varpi * (B @ B.T)
     first, second, third = A @ X1 - B @ W, (A + BB) @ X1 - H, -varpi * (B.T @ B) @ X3
     coupling = B @ X3 - varpi * X1 @ (A.T @ B) - varpi * X1 @ (BB @ B)
-    rows = [
-        [first + first.T, B @ W + BB @ X1, B @ X3, 0, 0, X1 @ C.T],
-        [second + second.T, coupling, 0, -H, 0],
-        [third + third.T, np.eye(m), 0, 0],
-        [-square * np.eye(m), 0, 0],
-        [-square * (2 * s * X1 - s**2 * ca.DM.eye(n)), 0],
-        [-np.eye(n)],
-    ]
-    lmis.psd(X1, margin=margin, name="X1 positive")
-    lmis.psd(X3, margin=margin, name="X3 positive")
-    lmis.nsd(block_matrix(rows), margin=margin, name="performance")
+    return [[first + first.T, B @ W + BB @ X1, B @ X3], [second + second.T, coupling], [third + third.T]]
+
+
+def uncoupled(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return states and inputs of each part of the plant that A, B and C do not couple with the others.
+
+    Nothing is lost by unknowns that do not couple them either: the LMI keeps its form if a part changes
+    its sign, so with a solution its average over the signs is one, and that is block-diagonal.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    n, m = B.shape
+    couples = np.block([[(A != 0) | (C != 0), B != 0], [np.zeros((m, n + m), dtype=bool)]])
+    _, part = connected_components(couples, directed=False)
+    found = [(np.flatnonzero(part[:n] == k), np.flatnonzero(part[n:] == k)) for k in range(part.max() + 1)]
+    return found if all(len(states) and len(inputs) for states, inputs in found) else [(np.arange(n), np.arange(m))]
+
+
+def _name(unknown: str, part: int, parts: Sequence[Any]) -> str:
+    return unknown if len(parts) == 1 else f"{unknown} of part {part}"
+
+
+def _pose(
+    plant: np.ndarray,
+    inputs: np.ndarray,
+    outputs: np.ndarray,
+    parts: Sequence[tuple[np.ndarray, np.ndarray]],
+    varpi: float,
+    s: float,
+    square: float,
+    margin: float,
+) -> Lmis:
+    lmis = Lmis()
+    for part, (state, control) in enumerate(parts):
+        names = {one: _name(one, part, parts) for one in ("X1", "X3", "W", "H")}
+        n, m, square_part = len(state), len(control), np.ix_(state, state)
+        A, B, C = ca.DM(plant[square_part]), ca.DM(inputs[np.ix_(state, control)]), ca.DM(outputs[square_part])
+        X1, X3 = lmis.symmetric(names["X1"], n), lmis.symmetric(names["X3"], m)
+        W, H = lmis.rectangular(names["W"], m, n), lmis.rectangular(names["H"], n, n)
+        first, second, third = loop_rows(A, B, varpi, X1, X3, W, H)
+        rows = [
+            [*first, 0, 0, X1 @ C.T],
+            [*second, 0, -H, 0],
+            [*third, np.eye(m), 0, 0],
+            [-square * np.eye(m), 0, 0],
+            [-square * (2 * s * X1 - s**2 * ca.DM.eye(n)), 0],
+            [-np.eye(n)],
+        ]
+        lmis.psd(X1, margin=margin, name=_name("X1 positive", part, parts))
+        lmis.psd(X3, margin=margin, name=_name("X3 positive", part, parts))
+        lmis.nsd(block_matrix(rows), margin=margin, name=_name("performance", part, parts))
     return lmis

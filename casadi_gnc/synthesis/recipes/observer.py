@@ -53,7 +53,7 @@ def observer(
     gamma : bound on the norm; by default (1 + slack) times the smallest.
     slack : see gamma; positive.
     margin : of the inequalities, in their units.
-    fastest_rad_s : the error's poles are kept to the right of minus this. Needed where w does not
+    fastest_rad_s : the error's poles are kept within this distance of zero. Needed where w does not
         disturb all of y: else the gain may run to infinity.
     backend, options : see `casadi_gnc.synthesis.backends`.
 
@@ -84,6 +84,8 @@ def observer(
         ("G", G, len(G), n),
     ):
         fits(name, matrix, rows, columns)
+    noisy = int(np.linalg.matrix_rank(F))
+    missing = f"w disturbs {noisy} of {r} measurements: give the others noise in F, or give fastest_rad_s."
 
     def pose(lmis: Lmis, gamma: Any) -> Any:
         P, H = lmis.symmetric("P", n), lmis.rectangular("H", n, r)
@@ -95,12 +97,21 @@ def observer(
             name="bounded real",
         )
         if fastest_rad_s is not None:
-            lmis.psd(moved + moved.T + 2 * fastest_rad_s * P, margin=0.1 * margin, name="fastest pole")
+            disc = block_matrix([[fastest_rad_s * P, moved], [fastest_rad_s * P]])
+            lmis.psd(disc, margin=0.1 * margin, name="fastest pole")
         return P
 
     def build(answer: LmiAnswer, promised: float) -> Synthesis:
         L = np.linalg.solve(answer["P"], answer["H"])
         norm = h_infinity_norm(A - L @ C, E - L @ F, G)
-        return certify_gains({"L": L}, answer, A - L @ C, plant_rate(A, C), promised=promised, norm=norm)
+        return certify_gains(
+            {"L": L},
+            answer,
+            A - L @ C,
+            plant_rate(A, C),
+            promised=promised,
+            norm=norm,
+            missing=missing if noisy < r else "Give fastest_rad_s.",
+        )
 
     return two_steps(pose, build, gamma, slack, backend, options)

@@ -27,7 +27,7 @@ import numpy as np
 
 from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
 from casadi_gnc.synthesis.answer import LmiAnswer
-from casadi_gnc.synthesis.gains import Synthesis, certify_gains, plant_rate
+from casadi_gnc.synthesis.gains import Synthesis, certify_gains, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.recipes.two_steps import two_steps
 from casadi_gnc.synthesis.unknowns import block_matrix
@@ -45,6 +45,8 @@ def state_feedback(
     slack: float = 0.02,
     margin: float = 1e-7,
     fastest_rad_s: float | None = None,
+    vertices: Any = None,
+    limit: float | None = None,
     backend: Any = "clarabel",
     **options: Any,
 ) -> Synthesis:
@@ -56,14 +58,16 @@ def state_feedback(
     gamma : bound on the norm; by default (1 + slack) times the smallest.
     slack : see gamma; positive.
     margin : of the inequalities, in their units.
-    fastest_rad_s : the closed loop's poles are kept to the right of minus this. Needed where z does
+    fastest_rad_s : the closed loop's poles are kept within this distance of zero. Needed where z does
         not hold all of u: else the gain may run to infinity.
+    vertices : (V, n), starts from whose hull the peak of the norm of u is simulated; see `box_vertices`.
+    limit : of that peak, which the LMIs do not know; larger commands are not certified.
     backend, options : see `casadi_gnc.synthesis.backends`.
 
     Returns
     -------
     Synthesis
-        With gain "K"; `promised` is gamma, `norm` the true one.
+        With gain "K"; `promised` is gamma, `norm` the true one, `ratios` factors of B that the loop tolerates.
 
     Raises
     ------
@@ -88,6 +92,9 @@ def state_feedback(
         ("F", F, p, q),
     ):
         fits(name, matrix, rows, columns)
+    vertices, most = starts(vertices, limit, n)
+    priced = int(np.linalg.matrix_rank(D))
+    missing = f"z prices {priced} of {m} commands: add rows with the others to D, or give fastest_rad_s."
 
     def pose(lmis: Lmis, gamma: Any) -> Any:
         X, W = lmis.symmetric("X", n), lmis.rectangular("W", m, n)
@@ -99,12 +106,24 @@ def state_feedback(
             name="bounded real",
         )
         if fastest_rad_s is not None:
-            lmis.psd(moved + moved.T + 2 * fastest_rad_s * X, margin=0.1 * margin, name="fastest pole")
+            disc = block_matrix([[fastest_rad_s * X, moved], [fastest_rad_s * X]])
+            lmis.psd(disc, margin=0.1 * margin, name="fastest pole")
         return X
 
     def build(answer: LmiAnswer, promised: float) -> Synthesis:
         K = np.linalg.solve(answer["X"], answer["W"].T).T
         norm = h_infinity_norm(A - B @ K, E, C - D @ K, F)
-        return certify_gains({"K": K}, answer, A - B @ K, plant_rate(A, B), promised=promised, norm=norm)
+        return certify_gains(
+            {"K": K},
+            answer,
+            A - B @ K,
+            plant_rate(A, B),
+            promised=promised,
+            norm=norm,
+            peak=peak_from(A - B @ K, K, vertices, plant_rate(A, B)),
+            limit=most,
+            parts=(A, -B @ K),
+            missing=missing if priced < m else "Give fastest_rad_s.",
+        )
 
     return two_steps(pose, build, gamma, slack, backend, options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -10,7 +11,7 @@ import numpy as np
 
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.answer import LmiAnswer
-from casadi_gnc.synthesis.gains import Synthesis, failed
+from casadi_gnc.synthesis.gains import GainStatus, Synthesis, failed
 from casadi_gnc.synthesis.lmis import Lmis
 
 
@@ -50,4 +51,8 @@ def two_steps(
     above.minimize(-ca.trace(pose(above, gamma)))
     answer = above.solve(backend, **options)
     second = build(answer, gamma) if answer.status.holds else failed(answer)
-    return second if second.is_certified or first is None else first
+    if first is None or second.is_certified:
+        return second
+    if first.is_certified and first.lmis.far:  # nor is there a largest solution a little above it
+        return replace(first, status=GainStatus.RUNS_AWAY)
+    return first if first.is_certified or not second.lmis.status.holds else second
