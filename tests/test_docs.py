@@ -1,5 +1,6 @@
 """Snippets of the documentation run as they stand."""
 
+import doctest
 import re
 from pathlib import Path
 
@@ -13,6 +14,23 @@ PYTHON = [
     for path in (ROOT / "README.md", ROOT / "docs" / "allocation.md")
     for block in re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
 ]
+
+#: Sections of the errata with their snippets, which build on each other.
+ERRATA = [
+    (section.split("\n", 1)[0], "\n".join(re.findall(r"```pycon\n(.*?)```", section, re.DOTALL)))
+    for section in re.split(r"^## ", (ROOT / "docs" / "errata.md").read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]
+    if "```pycon" in section
+]
+
+
+@pytest.mark.parametrize(("section", "snippets"), ERRATA, ids=[section for section, _ in ERRATA])
+def test_errata_have_evidence_that_runs(section, snippets):
+    """Each snippet prints what stands below it."""
+    test = doctest.DocTestParser().get_doctest(snippets, {}, section, "errata.md", 0)
+    told: list[str] = []
+    found = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test, out=told.append)
+    assert found.attempted > 5
+    assert not found.failed, "".join(told)
 
 
 @pytest.mark.parametrize(("name", "block"), PYTHON, ids=[name for name, _ in PYTHON])

@@ -28,6 +28,9 @@ from casadi_gnc.status import StepStatus
 
 Progress = Callable[[int, int], None]
 
+#: Flights of so many samples at most are flown on CasADi's virtual machine: to compile takes longer.
+_SHORT = 10_000
+
 
 @dataclass(frozen=True)
 class Question:
@@ -153,7 +156,9 @@ def _fly(flight: dict[str, Any], metric: list[dict[str, Any]], status: dict[str,
     """Return the metrics and status numbers of a flight by the ids of the claims that ask them."""
     mission = casadi_gnc.load(flight["problem"], dict(flight["changes"], metric=metric))
     alone = mission.with_scheme(flight["scheme"])
-    flown = casadi_gnc.fly(alone, mode=flight["mode"], decimation=mission.timing.samples)
+    samples = mission.timing.samples
+    engine = "vm" if samples <= _SHORT else "c"
+    flown = casadi_gnc.fly(alone, engine=engine, mode=flight["mode"], decimation=samples)
     values = dict(flown.metrics)
     for claim, asked in status.items():
         samples, first = flown.statuses.get(StepStatus[asked["name"]], (0, None))

@@ -42,12 +42,15 @@ have lambda k2 = 1.6.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from casadi_gnc import attitude
+from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.command_filter import CommandFilter
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
@@ -116,6 +119,18 @@ class TwoObserverAttitude(Law):
     def filter(self) -> CommandFilter:
         """The filter of the rate command."""
         return CommandFilter(self.filter_time_constant)
+
+    def checks(self) -> Iterator[Check]:
+        """Yield the four conditions of Theorem 1."""
+        theorem = "Huang and Duan (2019), Theorem 1"
+        strength = float(np.linalg.norm(np.array(self.body.inverse_inertia), 2)) * float(self.compensator_gain)
+        attitude_gain, rate_gain = float(self.attitude_gain), float(self.rate_gain)
+        drift, decay = float(self.attitude_observer_gain), float(self.compensator_decay)
+        lag = float(self.filter_time_constant)
+        yield sufficient("gains.theorem1.filter", 32 * attitude_gain, 9 * lag, "-", theorem)
+        yield sufficient("gains.theorem1.drift", 2 * attitude_gain * drift, 3.0, "1/s^2", theorem)
+        yield sufficient("gains.theorem1.observer", float(self.observer_gain) * rate_gain, 2.0, "1/s^2", theorem)
+        yield sufficient("gains.theorem1.compensation", 2 * rate_gain * decay, 3 * strength**2, "1/s^2", theorem)
 
     def known(self, now: Any, torque: Any) -> Any:
         """Return the modelled acceleration under a torque [N m] on the body, (3,), [rad/s^2]."""

@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable
 from importlib import import_module
 
-_PAPERS = ("huang2020",)
+_PAPERS = ("huang2019", "huang2020", "shi2020", "sun2018", "tao2019")
 
 
 def _collect() -> dict[str, Callable[..., float]]:
