@@ -11,6 +11,7 @@ import typer
 if TYPE_CHECKING:
     from casadi_gnc.missions.flight import Flight
     from casadi_gnc.missions.mission import Metric, Mission
+    from casadi_gnc.missions.sweeping import Sweep
 
 
 class EngineChoice(str, Enum):
@@ -43,20 +44,26 @@ def fly(
         MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")
     ] = MathChoice.gnc,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the file's own mode.")] = None,
-    decimation: Annotated[int, typer.Option(min=1, help="Keep every so many-th sample.")] = 1,
+    decimation: Annotated[int | None, typer.Option(min=1, help="Keep every so many-th sample.")] = None,
     plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
-    """Fly a mission and write <scheme>.npz, summary.json and pictures."""
+    """Fly a mission and write <scheme>.npz, summary.json and pictures; of one with sweeps summary.json alone."""
     from casadi_gnc.files import prepare_folder
     from casadi_gnc.missions import flight as results
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.missions.loading import load
+    from casadi_gnc.missions.sweeping import load_sweeps
 
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)
+    if sweeps := load_sweeps(problem):
+        options = {"engine": engine.value, "maths": math.value, "mode": mode.value if mode else None}
+        _fly_sweeps(mission, sweeps, list(dict.fromkeys(chosen)), folder, json, options)
+        return
     flights, written = [], []
+    _warn(mission, chosen, mode)
     for name in dict.fromkeys(chosen):
         with _Progress(name, quiet=json) as progress:
             flights.append(
@@ -75,6 +82,51 @@ def fly(
         _print(mission, flights, written)
     if any(flight.diverged for flight in flights):
         raise typer.Exit(1)
+
+
+def _warn(mission: Mission, chosen: list[str], mode: ModeChoice | None) -> None:
+    """Tell before the flight what laws say against their sample period."""
+    from casadi_gnc.missions.flying import cautions
+
+    timed = mission.with_timing(mode=mode.value) if mode else mission
+    for name in dict.fromkeys(chosen):
+        for sentence in cautions(timed.scheme(name)):
+            typer.echo(f"{name}: before the flight: {sentence}", err=True)
+
+
+def _fly_sweeps(
+    mission: Mission, sweeps: tuple[Sweep, ...], chosen: list[str], folder: Path, quiet: bool, options: dict[str, Any]
+) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    from casadi_gnc.missions.sweeping import fly_sweep, save_sweeps
+
+    flown = []
+    for sweep in sweeps:
+        with _Progress(sweep.name, quiet=quiet) as progress:
+            flown.append((sweep, fly_sweep(sweep, chosen, told=progress, **options)))
+    written = save_sweeps(folder, flown)
+    if quiet:
+        typer.echo(written.read_text(encoding="utf-8"), nl=False)
+        return
+    console = Console(soft_wrap=True)
+    console.print(mission.title or mission.name, highlight=False, markup=False)
+    for sweep, rows in flown:
+        metric = next((metric for metric in mission.metrics if metric.name == sweep.show), None)
+        unit = "s" if metric is None else metric.unit
+        shown = sweep.show.replace("_", " ").lower() + (f" [{unit}]" if unit else "")
+        table = Table(title=escape(shown))
+        changed = [part for part in sweep.key.split(".") if part != "*"][-1]
+        table.add_column(escape(changed.replace("_", " ")), justify="right")
+        for name in chosen:
+            table.add_column(name.replace("_", " "), justify="right")
+        for value, row in zip(sweep.values, rows, strict=True):
+            results = [sweep.shown(flight) for flight in row.values()]
+            table.add_row(escape(f"{value}"), *("never" if each is None else f"{each:.5g}" for each in results))
+        console.print(table, soft_wrap=False)
+    console.print(f"wrote to {folder}: {written.name}", highlight=False, markup=False)
 
 
 def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
@@ -123,13 +175,13 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
 
     console = Console(soft_wrap=True)
     table = Table(title=escape(mission.title or mission.name))
-    table.add_column("scheme", no_wrap=True)
-    for metric in mission.metrics:
-        unit = f" [{metric.unit}]" if metric.unit else ""
-        table.add_column((metric.name.replace("_", " ") + unit).replace("[", r"\["), justify="right")
+    table.add_column("")
     for flight in flights:
-        values = [flight.metrics[metric.name] for metric in mission.metrics]
-        table.add_row(flight.scheme, *(_shown(m, v) for m, v in zip(mission.metrics, values, strict=True)))
+        table.add_column(escape(flight.scheme.replace("_", " ")), justify="right")
+    for metric in mission.metrics:
+        unit = f" [{metric.unit}]" if metric.unit not in ("", "-") else ""
+        values = (_shown(metric, flight.metrics[metric.name]) for flight in flights)
+        table.add_row(escape(metric.name.replace("_", " ") + unit), *values)
     console.print(table, soft_wrap=False)
     for flight in flights:
         for bit, (count, first) in flight.statuses.items():

@@ -54,12 +54,15 @@ class Detumble(Law):
     inputs = Layout((Signal("rate", 3, "rad/s"),))
     memory = Layout((Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m s")))
     outputs = Layout((Signal("disturbance_estimate", 3, "rad/s^2"),))
-    errata = {"anti_windup_sign": "(43) prints -k3 B zeta; with (38) that is positive feedback when saturated."}
+    errata = {
+        "anti_windup_sign": "(43) prints -k3 B zeta; with (38) that is positive feedback when saturated.",
+        "held_feed_through": "Sampled with the gain of continuous time, the observer takes its ramp for a disturbance.",
+    }
 
     @property
     def observer(self) -> DisturbanceObserver:
         """The disturbance observer on the rate."""
-        return DisturbanceObserver(self.observer_gain, self.hold)
+        return DisturbanceObserver(self.observer_gain, 0.0 if "held_feed_through" in self.printed else self.hold)
 
     @property
     def compensator(self) -> SaturationCompensator:

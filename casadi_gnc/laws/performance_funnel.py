@@ -80,5 +80,9 @@ class PerformanceFunnel:
 
     def use(self, t: Any, s: Any) -> Any:
         """Return the largest share of the way to a wall, over the axes: below 1 is inside."""
+        return bounds.largest(self.use_by_axis(t, s))
+
+    def use_by_axis(self, t: Any, s: Any) -> Any:
+        """Return the share of the way to the nearer wall, (n,)."""
         lower, upper = self.walls(t)
-        return bounds.largest(bounds.maximum(s / upper, s / lower))
+        return bounds.maximum(s / upper, s / lower)

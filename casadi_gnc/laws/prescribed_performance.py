@@ -86,12 +86,13 @@ class PrescribedPerformance(Law):
         "anti_windup_sign": "(36) prints -k3 B zeta; with (38) that is positive feedback when saturated.",
         "cross_term": "(36) contains -G'r e1; r grows without bound, so no sample rate is fast enough.",
         "observer_start": "zeta(0) = 0 claims a disturbance beta e2(0) that is not there.",
+        "held_feed_through": "Sampled with the gain of continuous time, the observer takes its ramp for a disturbance.",
     }
 
     @property
     def observer(self) -> DisturbanceObserver:
         """The disturbance observer on the rate."""
-        return DisturbanceObserver(self.observer_gain, self.hold)
+        return DisturbanceObserver(self.observer_gain, 0.0 if "held_feed_through" in self.printed else self.hold)
 
     @property
     def compensator(self) -> SaturationCompensator:

@@ -67,7 +67,7 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         keep_trailing_newline=True,
         autoescape=False,
     )
-    plant, timing = mission.truth, mission.timing
+    plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
     return environment.get_template("flight.c.j2").render(
         title=f"{mission.name}, scheme {scheme.name}",
         mode=timing.mode,
@@ -90,7 +90,12 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         online=isinstance(scheme.actuation.allocator, OnlineInFlight),
         inexact=StepStatus.ALLOCATION_INEXACT.value,
         failed=StepStatus.ALLOCATION_FAILED.value,
-        tapes=[print_function(tape, maths=maths) for tape in tapes.functions.values()],
+        fused=fused,
+        tapes=[
+            print_function(tape, maths=maths)
+            for name, tape in tapes.functions.items()
+            if not (fused and name in ("before", "allocate"))
+        ],
     )
 
 
@@ -193,7 +198,7 @@ class _Tape:
 
 @dataclass(eq=False)
 class _Sample:
-    """What one evaluation of the controller leaves behind; `y` is the accepted measurement."""
+    """What one evaluation of the controller leaves behind; `y` is the accepted measurement, `slope` the rates."""
 
     y: np.ndarray
     m: np.ndarray
@@ -203,6 +208,7 @@ class _Sample:
     actuators: np.ndarray
     allocation_flags: float
     report: np.ndarray
+    slope: np.ndarray | None = None
 
 
 class VirtualMachineEngine:
@@ -251,6 +257,9 @@ class VirtualMachineEngine:
 
     def _control(self, carried: Carried, t: float, x: np.ndarray, m: np.ndarray, noise: np.ndarray) -> _Sample:
         tape, last = self._tape, carried.actuators
+        if "stage" in tape:
+            slope, accepted, m, wanted, limited, flags, told = tape["stage"](t, x, carried.good, m, last, noise)
+            return _Sample(accepted, m, wanted, limited, flags, told, 0.0, self._report, slope)
         y = tape["sense"](t, x, noise)
         accepted, m, wanted, limited, lower, upper, flags = tape["before"](t, y, carried.good, m, last)
         if self._solve is None:
@@ -258,6 +267,12 @@ class VirtualMachineEngine:
             return _Sample(accepted, m, wanted, limited, flags, told, 0.0, self._report)
         told, noted, report = self._solve(limited, last.copy(), lower, upper)
         return _Sample(accepted, m, wanted, limited, flags, told, float(noted), report)
+
+    def _slope(self, t: float, x: np.ndarray, noise: np.ndarray, s: _Sample) -> np.ndarray:
+        """Return the rates of plant and memory at a point of the integrator."""
+        if s.slope is not None:
+            return s.slope
+        return self._tape["flow"](t, x, s.y, s.m, s.wanted, s.limited, s.actuators, noise)
 
     def _advance(self, carried: Carried, t: float, noise: np.ndarray, s: _Sample) -> None:
         tape, h, n = self._tape, self._timing.sample_period, self._states
@@ -268,11 +283,10 @@ class VirtualMachineEngine:
                 carried.x[:] = tape["plant"](t + i * step, carried.x, s.actuators, noise)
             return
         state = np.concatenate([carried.x, s.m])
-        slopes = [tape["flow"](t, carried.x, s.y, s.m, s.wanted, s.limited, s.actuators, noise)]
+        slopes = [self._slope(t, carried.x, noise, s)]
         for length in (h / 2, h / 2, h):
             moved = tape["point"](state, slopes[-1], length)
             x, at = moved[:n], t + length
-            stage = self._control(carried, at, x, moved[n:], noise)
-            slopes.append(tape["flow"](at, x, stage.y, stage.m, stage.wanted, stage.limited, stage.actuators, noise))
+            slopes.append(self._slope(at, x, noise, self._control(carried, at, x, moved[n:], noise)))
         joined = tape["join"](state, *slopes)
         carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -33,7 +33,7 @@ def fly(
     engine: EngineName = "c",
     maths: Math = "gnc",
     mode: Mode | None = None,
-    decimation: int = 1,
+    decimation: int | None = None,
     progress: Progress | None = None,
 ) -> Flight:
     """Fly one scheme of a mission.
@@ -46,7 +46,7 @@ def fly(
         and the flight's notes say so.
     maths : elementary functions of the C: "gnc" (the same words on every machine) or "libm".
     mode : "sampled" or "continuous" instead of the mission's own.
-    decimation : keep every so many-th sample; metrics and statuses use all of them.
+    decimation : keep every so many-th sample, by default as the mission says; metrics and statuses use all of them.
     progress : called as progress(samples flown, samples in all).
 
     Raises
@@ -54,6 +54,7 @@ def fly(
     FlightError
         For an unknown scheme or a decimation below 1.
     """
+    decimation = mission.timing.record_every if decimation is None else decimation
     if decimation < 1:
         raise FlightError(f"decimation is {decimation}, expected 1 or more")
     if engine not in ("c", "vm") or maths not in ("gnc", "libm") or mode not in (None, "sampled", "continuous"):
@@ -99,8 +100,20 @@ def fly(
         statuses=raised,
         made=made,
         seconds=seconds,
-        notes=(*mission.notes, *notes, *_undefined(mission, values, raised)),
+        notes=(
+            *mission.notes,
+            *cautions(chosen),
+            *notes,
+            *_undefined(mission, values, raised),
+            *_left(mission, built, record),
+        ),
     )
+
+
+def cautions(scheme: Scheme) -> tuple[str, ...]:
+    """Return what the law of a scheme says against its sample period before it flies, a sentence each."""
+    found = (check for check in scheme.law.checks() if check.name.startswith("sampling."))
+    return tuple(f"{check.consequence} {check.remedy}" for check in found if check.verdict in ("warn", "fail"))
 
 
 def _room(rows: int, columns: int) -> np.ndarray:
@@ -148,6 +161,22 @@ def _undefined(
             notes.append(f"{metric.name}: never; at {end:g} s {metric.signal} was still above {metric.threshold:g}")
         elif values[metric.name] is None:
             notes.append(f"{metric.name}: none; no finite sample of {metric.signal} from {metric.after:g} to {end:g} s")
+    return tuple(notes)
+
+
+def _left(mission: Mission, built: tapes.Tapes, record: np.ndarray) -> tuple[str, ...]:
+    """Return for every funnel that was left, as far as samples were kept, when and on which axis first."""
+    notes, time = [], record[:, built.row.place("time")][:, 0]
+    for funnel in mission.funnels:
+        if funnel.signal not in built.row:
+            continue
+        lower, upper = (record[:, built.row.place(name)] for name in tapes.funnel_signals(mission, funnel).names[:2])
+        signal = record[:, built.row.place(funnel.signal)]
+        outside = ~((signal > lower) & (signal < upper))
+        if outside.any():
+            first = int(outside.any(axis=1).argmax())
+            axes = " and ".join(str(axis) for axis in np.flatnonzero(outside[first]) + 1)
+            notes.append(f"{funnel.signal} was outside its funnel from {time[first]:g} s on axis {axes} on")
     return tuple(notes)
 
 

@@ -96,12 +96,16 @@ class TimingModel(Part):
     sample_period_s: Positive
     duration_s: Positive
     plant_substeps: Annotated[int, Field(ge=1, le=1000)] = 1
+    record_period_s: Positive | None = Field(default=None, description="keep a sample so often; every one if left out")
 
     @model_validator(mode="after")
     def _whole(self) -> TimingModel:
         samples = self.duration_s / self.sample_period_s
         if not samples <= 1e9 or abs(samples - round(samples)) > 1e-6 * samples:
             raise ValueError(f"duration_s / sample_period_s is {samples:.6g}; expected a whole number up to 1e9")
+        kept = (self.record_period_s or self.sample_period_s) / self.sample_period_s
+        if kept < 0.5 or abs(kept - round(kept)) > 1e-6 * kept:
+            raise ValueError(f"record_period_s / sample_period_s is {kept:.6g}; expected a whole number")
         return self
 
 
@@ -183,6 +187,15 @@ class NoiseModel(Part):
     truncation_sigma: Positive | None = Field(default=None, description="larger ones are cut to so many deviations")
 
 
+class SweepModel(Part):
+    """Fly every scheme once for each of some values of one key, and tabulate one result."""
+
+    name: Name
+    key: str = Field(description='where in the file, e.g. "scheme.*.force_limit_N.*"; * stands for every item')
+    values: Annotated[list[float | str | bool], Field(min_length=1)]
+    show: str = Field(description="a metric, or a status such as FUNNEL_LEFT, of which the first time is shown")
+
+
 class MissionModel(Part):
     """What every mission file has; a craft adds its own tables, and `scheme` (`casadi_gnc.missions.crafts`)."""
 
@@ -194,6 +207,7 @@ class MissionModel(Part):
     timing: TimingModel
     noise: NoiseModel = NoiseModel()
     metric: list[MetricModel] = []
+    sweep: list[SweepModel] = []
 
     @field_validator("scheme", check_fields=False)
     @classmethod
@@ -219,7 +233,7 @@ class MissionModel(Part):
                 raise ValueError(f"{signal!r} has two funnels")
         return value
 
-    @field_validator("scheme", "metric", check_fields=False)
+    @field_validator("scheme", "metric", "sweep", check_fields=False)
     @classmethod
     def _names_differ(cls, value: list[Any]) -> list[Any]:
         names = [item.name for item in value]

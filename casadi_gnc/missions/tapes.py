@@ -13,9 +13,9 @@ allocate  y, limited, actuators, lower, upper -> actuators      (where the alloc
 judge     y, limited, actuators -> flags
 after     t, y, m, wanted, limited, actuators -> m              (sampled mode)
 plant     t, x, actuators, noise -> x, one Runge-Kutta step     (sampled mode)
-flow      t, x, y, m, wanted, limited, actuators, noise -> x', m'     (continuous mode)
-stage     t, x, good, m, actuators, noise -> x', m'; sense to flow in one, so that they share what they
-          have in common                                     (continuous mode, symbolic allocation)
+flow      t, x, y, m, wanted, limited, actuators, noise -> x', m'     (continuous mode, other allocation)
+stage     t, x, good, m, actuators, noise -> x', m', accepted, m, wanted, limited, flags, actuators: sense
+          to flow in one that shares what they have in common   (continuous mode, symbolic allocation)
 point     s, slope, length -> s, an integrator stage         (continuous mode)
 join      s, k1, k2, k3, k4 -> s, the stages' sum            (continuous mode)
 settle    x -> x in the representation kept between steps
@@ -294,11 +294,12 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
         ports = {"t": s.t, "x": s.x, "actuators": s.actuators, "noise": s.noise}
         tapes["plant"] = function("plant", ports, {"stepped": plant_step(mission, s.t, s.x, s.actuators, s.noise)})
     else:
-        slope = ca.vertcat(plant.rate(s.t, s.x, s.actuators, s.noise), law.rate(s.t, seen, s.m, s.wanted, told))
-        ports = {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}, "noise": s.noise}
-        tapes["flow"] = function("flow", ports, {"slope": slope})
         if scheme.actuation.is_symbolic:
             tapes["stage"] = _stage(mission, scheme)
+        else:
+            slope = ca.vertcat(plant.rate(s.t, s.x, s.actuators, s.noise), law.rate(s.t, seen, s.m, s.wanted, told))
+            ports = {"t": s.t, "x": s.x, **{k: v for k, v in loop.items() if k != "t"}, "noise": s.noise}
+            tapes["flow"] = function("flow", ports, {"slope": slope})
         tapes.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
     row = row_layout(mission, scheme)
     tally, fold = metrics.fold(mission.metrics, row)
@@ -314,7 +315,7 @@ def plant_step(mission: Mission, t: Any, x: Any, actuators: Any, noise_: Any) ->
 
 
 def _stage(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return the rates of plant and memory, controller and all, at a point of the integrator."""
+    """Return the controller at a point of the integrator, and the rates of plant and memory that follow."""
     s, plant, law = Symbols(mission, scheme), mission.truth, scheme.law
     ports = {"t": s.t, "x": s.x, "good": s.good, "m": s.m, "actuators": s.actuators, "noise": s.noise}
     s.y = plant.measure(s.t, s.x, s.noise)
@@ -323,7 +324,9 @@ def _stage(mission: Mission, scheme: Scheme) -> ca.Function:
     told = allocated(mission, scheme, y, limited, s.actuators, first["lower"], first["upper"])
     effort, seen = achieved(mission, scheme, y, limited, told), law_inputs(mission, scheme, y)
     moved = law.rate(s.t, seen, first["memory"], first["wanted"], effort)
-    return function("stage", ports, {"slope": ca.vertcat(plant.rate(s.t, s.x, told, s.noise), moved)})
+    slope = ca.vertcat(plant.rate(s.t, s.x, told, s.noise), moved)
+    kept = {name: first[name] for name in ("accepted", "memory", "wanted", "limited", "flags")}
+    return function("stage", ports, {"slope": slope, **kept, "told": told})
 
 
 def _integrator(size: int, h: float) -> dict[str, ca.Function]:

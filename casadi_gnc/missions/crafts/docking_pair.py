@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import casadi as ca
@@ -15,6 +16,7 @@ from pydantic import Field, model_validator
 
 from casadi_gnc import dipoles
 from casadi_gnc.allocation.in_flight import Direct
+from casadi_gnc.checks import Check
 from casadi_gnc.dipoles import TargetDipole
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.crafts import Craft, Where
@@ -254,6 +256,7 @@ def build(model: MissionFile, where: Where) -> Craft:
         believed=believed,
         actuation=lambda scheme: _actuation(scheme, craft, plant),
         target={"position": craft.port_m, "velocity": [0.0] * 3},
+        checks=lambda mission, scheme: _checks(given),
         panels=(
             Panel("tracked", "miss", "miss"),
             Panel("lines", "velocity", "velocity"),
@@ -263,6 +266,14 @@ def build(model: MissionFile, where: Where) -> Craft:
         ),
         notes=_notes(craft, given),
     )
+
+
+def _checks(orbit: Orbit) -> Iterator[Check]:
+    """Yield whether the orbit is one, about the Earth."""
+    from casadi_gnc.missions.checking import numbers
+
+    if orbit.mu_m3_per_s2 > 3e14:
+        yield from numbers.orbit(orbit.eccentricity, orbit.semi_major_axis_m * (1 - orbit.eccentricity), EARTH_RADIUS)
 
 
 def _notes(craft: Spacecraft, orbit: Orbit) -> tuple[str, ...]:

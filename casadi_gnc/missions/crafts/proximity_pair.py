@@ -216,7 +216,7 @@ def build(model: MissionFile, where: Where) -> Craft:
             Panel("effort", "torque", "torque"),
         ),
         target={name: [0.0] * 3 for name in RELATIVE.names},
-        checks=_checks,
+        checks=lambda mission, scheme: _checks(mission, scheme, model.orbit),
         notes=_orbit_notes(model.orbit, plant, start, where),
     )
 
@@ -235,13 +235,18 @@ def _actuation(scheme: Scheme) -> Actuation:
     )
 
 
-def _orbit_notes(orbit: Orbit, plant: ProximityPair, start: list[float], where: Where) -> tuple[str, ...]:
-    """Return what is wrong with the target's orbit; raise `ProblemError` where it must be circular and is not."""
+def _shape(plant: ProximityPair, start: list[float], mu: float) -> tuple[float, float]:
+    """Return eccentricity and perigee radius [m] of the target's orbit."""
     target = plant.target(ca.DM(start))
     r, v = (np.array(part).ravel() for part in (target.position, target.velocity))
-    mu, momentum = orbit.gravitational_parameter_m3_per_s2, np.cross(r, v)
+    momentum = np.cross(r, v)
     eccentricity = float(np.linalg.norm(np.cross(v, momentum) / mu - r / np.linalg.norm(r)))
-    perigee = float(momentum @ momentum / mu / (1 + eccentricity))
+    return eccentricity, float(momentum @ momentum / mu / (1 + eccentricity))
+
+
+def _orbit_notes(orbit: Orbit, plant: ProximityPair, start: list[float], where: Where) -> tuple[str, ...]:
+    """Return what is wrong with the target's orbit; raise `ProblemError` where it must be circular and is not."""
+    eccentricity, perigee = _shape(plant, start, orbit.gravitational_parameter_m3_per_s2)
     shape = f"eccentricity {eccentricity:.4g} and perigee radius {perigee / 1e3:.6g} km"
     if orbit.circular and eccentricity > CIRCULAR:
         raise ProblemError(
@@ -256,23 +261,27 @@ def _orbit_notes(orbit: Orbit, plant: ProximityPair, start: list[float], where: 
     return ()
 
 
-def _checks(mission: Any, scheme: Any) -> Iterator[Check]:
-    """Yield the theorem's condition that involves the target, and how near the chaser comes in a simulated flight."""
+def _checks(mission: Any, scheme: Any, orbit: Orbit) -> Iterator[Check]:
+    """Yield the orbit, the theorem's condition that involves the target, and how near the chaser comes, simulated."""
+    from casadi_gnc.missions.checking import numbers
     from casadi_gnc.missions.flying import fly
 
     plant: ProximityPair = mission.truth
+    yield from numbers.orbit(
+        *_shape(plant, mission.start, orbit.gravitational_parameter_m3_per_s2), orbit.body_radius_m
+    )
     rate = plant.target(ca.DM(mission.start)).rate
     yield coupling_condition(scheme.law, plant.motion, plant.target_inertia, rate)
     if plant.keep_out_radius:
         flight = fly(mission, scheme.name)
         yield Check(
-            "keep_out.closest",
+            "proximity.keep_out",
             float("nan") if flight.diverged else float(flight["target_distance"].min()),
             plant.keep_out_radius,
             "m",
             "fail",
             "On its way to the point the chaser enters the keep-out sphere: the law knows nothing of it.",
             "Start from the side of the point, or lead the chaser there by way points.",
-            "the mission, flown",
+            "the path that the law and the limits of the mission give, simulated",
             at_least=True,
         )

@@ -7,8 +7,10 @@ Source: Huang and Duan (2019), doi:10.1109/ACCESS.2019.2949285.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
-from typing import Annotated, Any, Literal
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, cast
 
 import casadi as ca
 import numpy as np
@@ -19,11 +21,13 @@ from casadi_gnc.actuator_faults import ActuatorFault, FaultSchedule
 from casadi_gnc.allocation import AllocationProblem, OnlineInFlight, PseudoInverse, SolverInFlight
 from casadi_gnc.allocation.faults import with_faults
 from casadi_gnc.bounds import any_of
+from casadi_gnc.checks import Check
 from casadi_gnc.errors import AllocationError, FlightError, ProblemError
 from casadi_gnc.missions import matrices
 from casadi_gnc.missions.crafts import Craft, Where
 from casadi_gnc.missions.crafts.combined_spacecraft import Environment, Initial, PinvModel
-from casadi_gnc.missions.mission import Actuation, Panel
+from casadi_gnc.missions.mission import Actuation, Mission, Panel
+from casadi_gnc.missions.mission import Scheme as MissionScheme
 from casadi_gnc.missions.schema import (
     Matrix,
     MissionModel,
@@ -170,7 +174,7 @@ class MissionFile(MissionModel):
 def build(model: MissionFile, where: Where) -> Craft:
     """Return the craft that a file describes."""
     craft, truth, sensors = model.spacecraft, model.truth, model.sensors
-    _check(model, where)
+    _refuse(model, where)
     wheels, orbit_rate = craft.wheels, model.environment.orbit_rate_rad_per_s
     known = WheelArray(_axes(craft, [0.0, 0.0, 0.0]), wheels.inertia_kg_m2)
     real = WheelArray(_axes(craft, truth.centre_of_mass_error_m), wheels.inertia_kg_m2)
@@ -201,6 +205,7 @@ def build(model: MissionFile, where: Where) -> Craft:
         believed=Gyrostat(ca.DM(craft.inertia_kg_m2), orbit_rate=orbit_rate, wheels=known),
         actuation=lambda scheme: _actuation(scheme, craft, known),
         target={"mrp": [0.0] * 3, "rate": [0.0] * 3},
+        checks=lambda mission, scheme: _checks(model, mission, scheme),
         truths=lambda mission, scheme: _truths(model, real),
         panels=(
             Panel("tracked", "mrp", "attitude MRP"),
@@ -210,6 +215,40 @@ def build(model: MissionFile, where: Where) -> Craft:
         ),
         notes=() if wheels.as_points is None else (AXES_AS_POINTS,),
     )
+
+
+def _checks(model: MissionFile, mission: Mission, scheme: MissionScheme) -> Iterator[Check]:
+    """Yield what can be said of a craft on wheels only."""
+    from casadi_gnc.missions.checking import geometry, wheels
+
+    craft, plant = model.spacecraft, cast(WheelSpacecraft, mission.truth)
+    if craft.wheels.as_points is not None:
+        yield geometry.rotation(
+            "geometry.configuration",
+            craft.wheels.as_points.matrix,
+            "The matrix that turns the wheels' axes is no rotation: lengths and angles between axes come out wrong.",
+            "Correct the matrix, or give the craft's orientation in the place of as_points.",
+        )
+    yield from wheels.wheel_speed(mission, scheme, plant.max_speed)
+    allocator, told = scheme.actuation.allocator, _told_errors(model, scheme.name)
+    if told is None or not any(fault.channel == "wheel" for fault in model.fault):
+        return
+
+    def with_weight(weight: float) -> Any:
+        return dataclasses.replace(allocator, problem=dataclasses.replace(allocator.problem, accuracy_weight=weight))
+
+    corners = []
+    for corner in itertools.product(*((-half, half) for half in told)):
+        array = WheelArray(_axes(craft, list(corner)), craft.wheels.inertia_kg_m2)
+        body = dataclasses.replace(plant.body, wheels=array)
+        corners.append(dataclasses.replace(mission, truth=dataclasses.replace(plant, body=body)))
+    yield wheels.weight_window(mission, scheme, with_weight, corners)
+
+
+def _told_errors(model: MissionFile, name: str) -> list[float] | None:
+    """Return the half widths of the mass centre that a scheme's allocation is told, if it is."""
+    allocation = next(scheme.allocation for scheme in model.scheme if scheme.name == name)
+    return allocation.centre_of_mass_error_m if isinstance(allocation, RobustModel) else None
 
 
 def _truths(model: MissionFile, real: WheelArray) -> dict[str, np.ndarray]:
@@ -225,7 +264,8 @@ def _truths(model: MissionFile, real: WheelArray) -> dict[str, np.ndarray]:
                 e[:, fault.index - 1] *= fault.effectiveness
             else:
                 e[fault.index - 1] *= fault.effectiveness
-        told = ", ".join(f"{fault.channel} {fault.index} at {fault.effectiveness:g}" for fault in present)
+        weak = [fault for fault in present if fault.effectiveness != 1]
+        told = ", ".join(f"{fault.channel} {fault.index} at {fault.effectiveness:g}" for fault in weak) or "biases"
         truths[f"the faults from {onset:g} s on ({told})"] = e
     return truths
 
@@ -240,7 +280,7 @@ def _axes(craft: Spacecraft, error: list[float]) -> ca.DM:
     return reaction_wheels.free_axes(ca.DM.eye(3) if turned is None else turned, mounted)
 
 
-def _check(model: MissionFile, where: Where) -> None:
+def _refuse(model: MissionFile, where: Where) -> None:
     """Refuse a mass centre where none enters, and a robust allocation against nothing."""
     enters = model.spacecraft.wheels.as_points is not None
     told = (

@@ -1,0 +1,138 @@
+"""Fly a problem file once for each value of a key, as its [[sweep]] tables say.
+
+A sweep is nothing but changed copies of the file's content, checked and built like the file itself.
+"""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.files import write_beside
+from casadi_gnc.missions import building, loading, toml_place
+from casadi_gnc.missions.flight import Flight
+from casadi_gnc.missions.flying import fly
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.status import StepStatus
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Hold one sweep: a mission for each value.
+
+    Parameters
+    ----------
+    name, key : of the sweep, and path of the key in the file.
+    show : name of a metric, or of a status of which the first time is shown.
+    values : what the key is set to.
+    missions : one a value.
+    """
+
+    name: str
+    key: str
+    show: str
+    values: tuple[Any, ...]
+    missions: tuple[Mission, ...]
+
+    def shown(self, flight: Flight) -> float | None:
+        """Return the result of a flight that the table shows; None is never."""
+        if self.show in StepStatus.__members__:
+            return flight.statuses.get(StepStatus[self.show], (0, None))[1]
+        return flight.metrics[self.show]
+
+
+def load_sweeps(problem: str | Path) -> tuple[Sweep, ...]:
+    """Return the sweeps of a problem file, none if it has no [[sweep]].
+
+    Raises
+    ------
+    ProblemError
+        For a bad file, a key that leads nowhere, a value that the file cannot have, a result that no flight has.
+    """
+    path, text, data = loading.read_kind(problem, "mission")
+    sweeps = []
+    for i, table in enumerate(loading.check(data, path, text).sweep):
+        place = toml_place.describe(path, text, ("sweep", i))
+        missions = []
+        for number, value in enumerate(table.values, 1):
+            changed = copy.deepcopy(data)
+            if not _set(changed, table.key.split("."), value):
+                raise ProblemError(f"{table.key!r} leads to no table or list of the file", place)
+            try:
+                mission = building.build(loading.check(changed, path, text), path, text)
+            except ProblemError as error:
+                raise ProblemError(f"with {table.key} = {value!r}: {error}", place) from None
+            missions.append(replace(mission, name=f"{mission.name}_{table.name}_{number}"))
+        known = [metric.name for metric in missions[0].metrics] + list(StepStatus.__members__)
+        if table.show not in known:
+            raise ProblemError(f"show is {table.show!r}, expected one of {', '.join(known)}", place)
+        sweeps.append(Sweep(table.name, table.key, table.show, tuple(table.values), tuple(missions)))
+    return tuple(sweeps)
+
+
+def _set(content: Any, path: Sequence[str], value: Any) -> bool:
+    """Set what a path leads to, in place; return whether it leads anywhere."""
+    part, rest = path[0], path[1:]
+    places: list[Any]
+    if isinstance(content, list):
+        named = [i for i, item in enumerate(content) if isinstance(item, dict) and item.get("name") == part]
+        places = list(range(len(content))) if part == "*" else named
+    elif isinstance(content, dict):
+        places = list(content) if part == "*" else [part]
+    else:
+        return False
+    if not rest:
+        for each in places:
+            content[each] = value
+        return bool(places)
+    inside = [content[each] for each in places if not isinstance(content, dict) or each in content]
+    return bool(inside) and all(_set(each, rest, value) for each in inside)
+
+
+def fly_sweep(
+    sweep: Sweep, schemes: Sequence[str] = (), *, told: Callable[[int, int], None] | None = None, **options: Any
+) -> list[dict[str, Flight]]:
+    """Return flights by scheme for each value of a sweep; only metrics and statuses are kept of them.
+
+    Parameters
+    ----------
+    sweep : from `load_sweeps`.
+    schemes : names; all by default.
+    told : called as told(flights flown, flights in all).
+    options : as for `fly`.
+    """
+    names = list(schemes) or [scheme.name for scheme in sweep.missions[0].schemes]
+    rows: list[dict[str, Flight]] = []
+    for mission in sweep.missions:
+        row = {}
+        for name in names:
+            row[name] = fly(mission, name, **{**options, "decimation": mission.timing.samples})
+            if told:
+                told(len(rows) * len(names) + len(row), len(sweep.missions) * len(names))
+        rows.append(row)
+    return rows
+
+
+def save_sweeps(folder: Path, flown: Sequence[tuple[Sweep, list[dict[str, Flight]]]]) -> Path:
+    """Write `summary.json` with every flight's summary; return its path."""
+    content = [
+        {
+            "sweep": sweep.name,
+            "key": sweep.key,
+            "show": sweep.show,
+            "values": [
+                {"value": value, "schemes": [{**f.summary(), "shown": sweep.shown(f)} for f in row.values()]}
+                for value, row in zip(sweep.values, rows, strict=True)
+            ],
+        }
+        for sweep, rows in flown
+    ]
+    target = folder / "summary.json"
+    text = json.dumps(content, indent=2, allow_nan=False) + "\n"
+    write_beside(target, lambda path: path.write_text(text, encoding="utf-8"))
+    return target
