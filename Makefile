@@ -1,6 +1,8 @@
 # make demo   fly the de-tumble mission; pictures and table in out/detumble
 # make test   style, types and the whole test suite
-# make bench  speed, as ratios in one run
+# make bench  every solver that is installed, on the shipped sets; report in out/bench/allocation
+# make ratios every time and ratio that the documentation quotes, into docs/ratios.md
+# make gates  the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers
 # make targets  compilers and emulators of the flight targets (Debian packages; needs root)
 # Everything is installed into .venv here; needed beforehand: python3 (3.11 or newer, with venv), a
 # C compiler and make.
@@ -9,7 +11,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test bench targets pictures lint docs clean
+.PHONY: demo test bench ratios gates targets pictures lint docs clean
 
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
@@ -31,10 +33,14 @@ pictures: .venv/installed
 	cp $(OUT)/docking/iobc.png docs/images/docking.png
 	$(BIN)/casadi-gnc fly problems/huang2019/vertices.toml --out $(OUT)/vertices
 	cp $(OUT)/vertices/comparison.png docs/images/wheels_vertices.png
+	$(BIN)/casadi-gnc fly problems/tao2019/case2.toml --out $(OUT)/drag_free
+	cp $(OUT)/drag_free/comparison.png docs/images/drag_free.png
 
 bench: .venv/installed-dev
-	$(BIN)/python tests/bench/flight_speed.py
-	$(BIN)/python tests/bench/allocation_speed.py
+	$(BIN)/casadi-gnc bench allocation --out $(OUT)/bench/allocation
+
+ratios: .venv/installed-dev
+	$(BIN)/python tests/bench/ratios.py
 
 # What codegen/targets/*.toml name under `packages`.
 TARGETS := $(shell sed -n 's/^packages = \[\(.*\)\]/\1/p' codegen/targets/*.toml | tr -d '",')
@@ -42,6 +48,10 @@ TARGETS := $(shell sed -n 's/^packages = \[\(.*\)\]/\1/p' codegen/targets/*.toml
 targets:
 	apt-get update -qq
 	apt-get install -y -qq --no-install-recommends $(sort $(TARGETS))
+
+# Needs gcc, g++, clang, clang-tidy and cppcheck; nothing of Python but Python itself.
+gates:
+	$(PYTHON) tests/runtime/gates.py
 
 docs: .venv/installed-docs
 	$(BIN)/sphinx-build -W -q docs docs/_build

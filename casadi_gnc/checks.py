@@ -55,7 +55,7 @@ class Check:
 
     @property
     def verdict(self) -> Verdict:
-        """ "ok", or what the check says otherwise."""
+        """The word `ok`, or that of `otherwise`."""
         return "ok" if self.holds else self.otherwise
 
     def of(self, scheme: str) -> Check:
@@ -80,4 +80,4 @@ def sufficient(name: str, value: float, limit: float, unit: str, source: str) ->
 
 def worst(checks: list[Check]) -> Verdict:
     """Return the gravest verdict of several checks."""
-    return max((check.verdict for check in checks), key=VERDICTS.index, default="ok")
+    return VERDICTS[max((VERDICTS.index(check.verdict) for check in checks), default=0)]

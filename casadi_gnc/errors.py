@@ -51,3 +51,15 @@ class FlightError(GncError):
 
 class SynthesisError(GncError):
     """Report matrix inequalities that cannot be posed, or a gain asked for that is not certified."""
+
+
+class BenchmarkError(GncError):
+    """Report a benchmark that cannot be run, or results that cannot be read."""
+
+
+class PackageError(GncError):
+    """Report a flight package that cannot be written, read or verified as asked."""
+
+
+class TargetError(GncError):
+    """Report a target that is not known, lacks its tools, or did not run the program."""

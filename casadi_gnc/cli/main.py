@@ -7,7 +7,20 @@ import sys
 
 import typer
 
-from casadi_gnc.cli import allocate, attainable, doctor, fly, problems, schema, synthesize
+from casadi_gnc.cli import (
+    allocate,
+    attainable,
+    bench,
+    check,
+    doctor,
+    fly,
+    generate,
+    problems,
+    reproduce,
+    schema,
+    synthesize,
+    verify,
+)
 from casadi_gnc.errors import GncError
 
 app = typer.Typer(
@@ -19,10 +32,15 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command("fly")(fly.fly)
+app.command("check")(check.check)
 app.command("allocate")(allocate.allocate)
 app.command("attainable")(attainable.attainable)
 app.command("synthesize")(synthesize.synthesize)
+app.command("generate")(generate.generate)
+app.command("verify")(verify.verify)
+app.add_typer(bench.app, name="bench")
 app.add_typer(problems.app, name="problems")
+app.command("reproduce")(reproduce.reproduce)
 app.command("schema")(schema.schema)
 app.command("doctor")(doctor.doctor)
 

@@ -12,11 +12,13 @@ def schema() -> None:
     """Print the JSON Schema of a problem file."""
     from pydantic import TypeAdapter
 
+    from casadi_gnc.benchmarks.sets import BenchmarkModel
+    from casadi_gnc.fidelity.claims import ClaimsFile
     from casadi_gnc.missions import crafts
     from casadi_gnc.missions.allocation_file import AllocationModel
     from casadi_gnc.missions.synthesis_file import SynthesisModel
 
-    files: Any = AllocationModel | SynthesisModel
+    files: Any = AllocationModel | SynthesisModel | BenchmarkModel | ClaimsFile
     for name in crafts.names():
         files = files | crafts.module(name).MissionFile
     described = TypeAdapter(files).json_schema()

@@ -8,7 +8,7 @@ there. The tables of a craft are declared in its file in `casadi_gnc.missions.cr
 from __future__ import annotations
 
 import dataclasses
-from typing import Annotated, Any, Literal, Union
+from typing import Annotated, Any, Literal
 
 import casadi as ca
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, field_validator, model_validator
@@ -140,8 +140,12 @@ LAW_MODELS = {name: _law_model(name, law) for name, law in LAWS.items()}
 def law_tables(*names: str) -> Any:
     """Return the type of a scheme's `law`: the table of one of some laws, told apart by `type`."""
     models = tuple(LAW_MODELS[name] for name in names)
-    union: Any = Union.__getitem__(models)  # made at run time
-    return Annotated[union, Field(discriminator="type")] if len(models) > 1 else models[0]
+    if len(models) == 1:
+        return models[0]
+    alternatives: Any = models[0]
+    for model in models[1:]:
+        alternatives = alternatives | model
+    return Annotated[alternatives, Field(discriminator="type")]
 
 
 class SchemeModel(Part):

@@ -3,7 +3,7 @@
     python tests/bench/allocation_speed.py [--daqp-source daqp-x.y.z/csrc] [--samples 4000] [--no-native]
 
 Robust problem: a closed-loop flight at 10 Hz with 12 thrusters and 8 vertices. Clarabel is set up once and
-updated; its wall time spans update and solve; the time it reports itself is shown too, but contains its first
+updated; its processor time spans update and solve; the time it reports itself is shown too, but contains its first
 set-up. Non-robust problem: the same commands with V = 1, P = 0; DAQP runs inside a C loop if its C sources are
 given (`pip download --no-binary :all: daqp`), else by its Python function, whose reported solve time is used.
 Each time is the least of several repeats of one command; then come median, mean and maximum over commands.
@@ -12,6 +12,7 @@ Answers are compared by their true objective.
 
 import argparse
 import ctypes
+import json
 import platform
 import subprocess
 import sys
@@ -28,7 +29,11 @@ oa = import_module("online_allocator")
 H_WEIGHT, BOX = 1e6, 5e-3
 
 
-def table(rows):
+MEASURED = {}  # what --json writes: for each flight the rows of both tables, and ratios
+
+
+def table(rows, flight, kind):
+    MEASURED.setdefault(flight, {})[kind] = dict(rows)
     for label, values in rows:
         print(f"  {label:38s}" + "".join(f"{name} {value:>10}   " for name, value in values.items()))
 
@@ -76,14 +81,14 @@ class ConicPeer:
         b = np.concatenate(
             [upper / oa.MAX_FORCE, -lower / oa.MAX_FORCE] + [np.r_[0.5, -0.5, u / self.unit]] * self.copies
         )
-        start = time.perf_counter()
+        start = time.process_time()
         self.solver.update(q=q, b=b)
         solution = self.solver.solve()
-        wall = 1e6 * (time.perf_counter() - start)
+        wall = 1e6 * (time.process_time() - start)
         return np.clip(np.array(solution.x[:12]) * oa.MAX_FORCE, lower, upper), wall, solution
 
 
-def robust(flight, flags, repeats, every):
+def robust(title, flight, flags, repeats, every):
     D = oa.centre_of_mass_vertices([BOX] * 3)
     commands = [flight[k] for k in ("u", "previous", "lower", "upper")]
     some = [c[::every] for c in commands]
@@ -126,7 +131,7 @@ def robust(flight, flags, repeats, every):
             error = best(np.array(forces), some[0], some[1], D) / reference - 1
             rows.append(
                 (
-                    f"Clarabel, update, {tolerance:g}, wall",
+                    f"Clarabel, update, {tolerance:g}",
                     {
                         **statistics(walls),
                         "own": f"{np.median(owns):.0f}",
@@ -138,11 +143,16 @@ def robust(flight, flags, repeats, every):
     except ImportError:
         print("  (clarabel is not installed)")
     found["the paper's SDP"], own = semidefinite(D, [c[:: max(1, len(c) // 40)] for c in some])
-    rows.append(("the paper's SDP, Clarabel, wall", {**statistics(found["the paper's SDP"]), "own": f"{own:.0f}"}))
-    table(rows)
+    rows.append(("the paper's SDP, Clarabel", {**statistics(found["the paper's SDP"]), "own": f"{own:.0f}"}))
+    table(rows, title, "robust")
     w, c = found["online, warm"], found["online, cold"]
     for name, p in found.items():
         if not name.startswith("online"):
+            MEASURED[title].setdefault("ratios", {})[name] = {
+                "warm, median": np.median(p) / np.median(w),
+                "warm, mean": p.mean() / w.mean(),
+                "cold, median": np.median(p) / np.median(c),
+            }
             print(
                 f"  {name}: warm {np.median(p) / np.median(w):.0f} x in the median, "
                 f"{p.mean() / w.mean():.0f} x in the mean; "
@@ -151,7 +161,7 @@ def robust(flight, flags, repeats, every):
 
 
 def semidefinite(D, some):
-    """Return wall times [us] of the SDP of Theorem 3 (casadi_gnc's back end, set up once), and its own median."""
+    """Return processor times [us] of the SDP of Theorem 3 (casadi_gnc's back end, set up once), and its own median."""
     from casadi_gnc.allocation import AllocationProblem, backends
 
     problem = AllocationProblem(oa.A0_2020, 0.0, oa.MAX_FORCE, coupling=oa.E_2020, errors=np.array(D))
@@ -159,9 +169,9 @@ def semidefinite(D, some):
     for row in zip(*some, strict=True):
         tries = []
         for _ in range(3):
-            start = time.perf_counter()
+            start = time.process_time()
             found = solver.find(*row)
-            tries.append((1e6 * (time.perf_counter() - start), 1e6 * found.seconds))
+            tries.append((1e6 * (time.process_time() - start), 1e6 * found.seconds))
         walls.append(min(wall for wall, _ in tries))
         owns.append(min(own for _, own in tries))
     return np.array(walls), float(np.median(owns))
@@ -187,7 +197,7 @@ def daqp_library(source):
     return ctypes.CDLL(str(folder / "daqp.so"))
 
 
-def not_robust(flight, flags, repeats, source):
+def not_robust(title, flight, flags, repeats, source):
     u, previous, lower, upper = [np.ascontiguousarray(flight[k]) for k in ("u", "previous", "lower", "upper")]
     allocator = oa.Allocator(12, 3, 0, 1, flags=flags)
     allocator.setup(oa.A0_2020, None, None, 1, 1, H_WEIGHT)
@@ -244,7 +254,7 @@ def not_robust(flight, flags, repeats, source):
             continue
         error = objective(np.clip(x * unit, lower, upper)) / objective(r["force"]) - 1
         rows.append((name, {**statistics(time_), "accuracy": f"{np.median(error):.0e}", "worst": f"{error.max():.0e}"}))
-    table(rows)
+    table(rows, title, "not robust")
 
 
 def main():
@@ -253,6 +263,8 @@ def main():
     parser.add_argument("--samples", type=int, default=4000)
     parser.add_argument("--every", type=int, default=20, help="Clarabel and cold starts on every n-th command")
     parser.add_argument("--repeats", type=int, default=9)
+    parser.add_argument("--flight", action="append", help="only this one of the four; may be repeated")
+    parser.add_argument("--json", type=Path, help="file for the same numbers")
     parser.add_argument("--no-native", action="store_true", help="compile for the generic processor of the family")
     options = parser.parse_args()
     flags = oa.FAST_FLAGS + (() if options.no_native else ("-march=native",))
@@ -263,12 +275,16 @@ def main():
         "slew with rate box": {"rate": 1e-2},
         "de-tumble": {},
     }.items():
+        if options.flight and name not in options.flight:
+            continue
         kind = "detumble" if name == "de-tumble" else "slew"
         flight = oa.fly(kind, options.samples, box=BOX, **arguments)
         print(f"{name}: {options.samples} samples, robust")
-        robust(flight, flags, options.repeats, options.every)
+        robust(name, flight, flags, options.repeats, options.every)
         print(f"{name}: not robust")
-        not_robust(flight, flags, options.repeats, options.daqp_source)
+        not_robust(name, flight, flags, options.repeats, options.daqp_source)
+    if options.json:
+        options.json.write_text(json.dumps(MEASURED, indent=2) + "\n")
 
 
 if __name__ == "__main__":

@@ -58,7 +58,7 @@ def test_first_estimate_is_zero(law, y):
 
 def test_advance_is_the_rate_for_a_short_hold(name, y, rng):
     """A hold of 1e-6 s: quotient and rate agree to what the second derivative leaves."""
-    mission, scheme = flown_by()[name]
+    _, scheme = flown_by()[name]
     law = replace(scheme.law, hold=1e-6)
     if not law.memory.size:
         return
