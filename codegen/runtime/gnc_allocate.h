@@ -37,6 +37,10 @@
  * The header may be included again with other sizes and another prefix. No heap, no globals, no
  * recursion, every loop is bounded; all state lies in the caller's structs, so calls on different
  * workspaces may run at the same time.
+ *
+ * Assertions never stop the processor. One that fails (memory was damaged, or numbers overflowed) makes the
+ * call give up that way and, where no other is left, hold the last forces with status BAD_COMMAND. Define
+ * GNC_ASSERT(condition) when compiling the sources to be told; it must return the truth of the condition.
  */
 #ifndef GNC_ALLOCATE_ONCE
 #define GNC_ALLOCATE_ONCE
@@ -54,7 +58,7 @@ enum gnc_alloc_status {
     GNC_ALLOC_OPTIMAL = 0,       /* gap <= tolerance * objective */
     GNC_ALLOC_AT_ROUNDING = 1,   /* gap <= what rounding explains; usable */
     GNC_ALLOC_NOT_CERTIFIED = 2, /* iteration limit: feasible, its gap is reported */
-    GNC_ALLOC_BAD_COMMAND = 3,   /* not finite, or lo > hi: last feasible answer returned */
+    GNC_ALLOC_BAD_COMMAND = 3,   /* not finite, too large, lo > hi, absent: last feasible answer returned */
     GNC_ALLOC_BAD_PROBLEM = 4    /* set-up refused: weights, h, or numbers that are not finite */
 };
 
@@ -195,7 +199,9 @@ void GNC_ALLOC_NAME(reset)(GNC_ALLOC_NAME(workspace) * workspace);
  *   max_step  N      N     largest change in one sample (rate limit times sample time, >= 0), or
  *                          null. If the rate box misses the amplitude box, the amplitude box wins.
  *
- * Whatever the input, the call returns within a bounded number of operations with finite forces. */
+ * Whatever the input, the call returns within a bounded number of operations with finite forces, which
+ * are within those bounds that are finite and in order. Where an array is absent (a null pointer) nothing
+ * is known and the forces are zero; without a result nothing is written. */
 int32_t GNC_ALLOC_NAME(solve)(GNC_ALLOC_NAME(workspace) * workspace,
                               const GNC_ALLOC_NAME(data) * data,
                               const GNC_ALLOC_NAME(real) * torque,

@@ -23,46 +23,31 @@
 #define DEPENDENT 1e-11
 #endif
 
-/* Bring L, W and T up to date with the free set and the vertex weights. */
-void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
+/* L L' = S_free diag(1/q) S_free', an outer product at a time. */
+static int factor_free_set(workspace_t *work, const data_t *data, real *inverse)
 {
-    int i, k, l, v, e, same_set, same_weights;
-    uint32_t free_set = 0;
-    real C[K][K], inverse[K], drift = 0;
+    int i, k, l, e = 0;
+    real packed[KT] = {0};
     for (i = 0; i < N; ++i) {
-        free_set |= work->side[i] ? 0U : (uint32_t)1 << i;
-    }
-    for (v = 0; v < V; ++v) {
-        drift += size_of(work->lambda[v] - work->lambda_W[v]);
-    }
-    same_set = work->stamp == data->stamp && work->free_set == free_set;
-    same_weights = work->stamp == data->stamp && drift <= LAMBDA_DRIFT && !always;
-    if (same_set && same_weights) {
-        return;
-    }
-    if (!same_set) {
-        real packed[KT] = {0};
-        for (i = 0; i < N; ++i) {
-            if (!work->side[i]) {
-                for (e = 0; e < KT; ++e) {
-                    packed[e] += data->SS[i][e] * data->inv_curvature[i];
-                }
+        if (work->side[i] == 0) {
+            for (k = 0; k < KT; ++k) {
+                packed[k] += data->SS[i][k] * data->inv_curvature[i];
             }
         }
-        for (k = 0, e = 0; k < K; ++k) {
-            for (l = 0; l <= k; ++l, ++e) {
-                work->L[k][l] = packed[e];
-            }
+    }
+    for (k = 0; k < K; ++k) {
+        for (l = 0; l <= k; ++l) {
+            work->L[k][l] = packed[e];
+            ++e;
         }
-        factor(&work->L[0][0], inverse, K, 4 * EPS);
-        work->stamp = data->stamp;
-        work->free_set = free_set;
     }
-    if (!same_weights) { /* or else keep W: two sets compared on one path should see the same curvature */
-        memcpy(work->lambda_W, work->lambda, sizeof work->lambda);
-    }
-    NAME(inner_matrix)(data, work->lambda_W, work->L, work->W, C);
-    factor(&C[0][0], inverse, K, 0);
+    return NAME(factor)(work->L, inverse, 4 * EPS);
+}
+
+/* T = C^-1 L' */
+static void solve_for_T(workspace_t *work, real (*C)[K], const real *inverse)
+{
+    int i, k, l;
     for (k = 0; k < K; ++k) {
         real row[K];
         for (l = 0; l < K; ++l) {
@@ -74,9 +59,49 @@ void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
             }
         }
         for (l = 0; l < K; ++l) {
-            work->T[k][l] = work->Tt[l][k] = row[l] * inverse[k];
+            work->T[k][l] = row[l] * inverse[k];
+            work->Tt[l][k] = work->T[k][l];
         }
     }
+}
+
+/* Bring L, W and T up to date with the free set and the vertex weights. */
+int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
+{
+    int i, v, known, same_set, same_weights, sound = 1;
+    uint32_t free_set = 0, bit = 1;
+    real C[K][K], inverse[K], drift = 0;
+    for (i = 0; i < N; ++i) {
+        free_set |= work->side[i] != 0 ? 0U : bit;
+        bit <<= 1;
+    }
+    for (v = 0; v < V; ++v) {
+        drift += size_of(work->lambda[v] - work->lambda_W[v]);
+    }
+    if (!GNC_ASSERT(is_finite(drift))) {
+        return 0;
+    }
+    known = work->stamp == data->stamp;
+    same_set = known && work->free_set == free_set;
+    same_weights = known && drift <= LAMBDA_DRIFT && always == 0;
+    if (same_set && same_weights) {
+        return 1;
+    }
+    if (!same_set) {
+        sound = factor_free_set(work, data, inverse);
+        work->stamp = data->stamp;
+        work->free_set = free_set;
+    }
+    if (!same_weights) { /* or else keep W: two sets compared on one path should see the same curvature */
+        (void)memcpy(work->lambda_W, work->lambda, sizeof work->lambda);
+    }
+    sound &= NAME(inner_matrix)(data, work->lambda_W, work->L, work->W, C);
+    sound &= NAME(factor)(C, inverse, 0);
+    solve_for_T(work, C, inverse);
+    if (!sound) {
+        work->stamp = 0; /* never to be used again */
+    }
+    return sound;
 }
 
 /* out = A in, A given by its columns: one multiplication and addition for all rows at once */
@@ -89,7 +114,7 @@ static void multiply(real (*column)[K], const real *in, real *out)
             sum[k] += column[l][k] * in[l];
         }
     }
-    memcpy(out, sum, sizeof sum);
+    (void)memcpy(out, sum, sizeof sum);
 }
 
 /* Inner product in two halves, which do not wait for each other. */
@@ -101,24 +126,29 @@ static real product(const real *a, const real *b)
         even += a[k] * b[k];
         odd += a[k + 1] * b[k + 1];
     }
-    return K % 2 ? even + odd + a[K - 1] * b[K - 1] : even + odd;
+#if GNC_ALLOC_K % 2 == 1
+    return even + odd + a[K - 1] * b[K - 1];
+#else
+    return even + odd;
+#endif
 }
 
-static void list_vertices(vertices_t *vert, const workspace_t *work, const data_t *data, const point_t *point)
+/* The active vertices, the heaviest first, and their gradients z; return how many. */
+static int list_vertices(vertices_t *vert, const workspace_t *work, const data_t *data, const point_t *point)
 {
-    int a, k, j, v;
-    vert->count = 0;
-    for (v = 0; v < V && vert->count < A; ++v) {
-        if (work->active[v]) {
-            vert->list[vert->count] = v;
+    int a, k, j, v, count = 0;
+    for (v = 0; v < V && count < A; ++v) {
+        if (work->active[v] != 0) {
+            vert->list[count] = v;
             if (work->lambda[v] > work->lambda[vert->list[0]]) {
-                vert->list[vert->count] = vert->list[0];
+                vert->list[count] = vert->list[0];
                 vert->list[0] = v;
             }
-            ++vert->count;
+            ++count;
         }
     }
-    for (a = 0; a < vert->count; ++a) {
+    vert->count = count;
+    for (a = 0; a < A && a < count; ++a) {
         real z[K] = {0};
         v = vert->list[a];
         for (k = 0; k < R; ++k) {
@@ -127,20 +157,24 @@ static void list_vertices(vertices_t *vert, const workspace_t *work, const data_
                 z[R + j] += data->Dv[v][k][j] * z[k];
             }
         }
-        memcpy(vert->z[a], z, sizeof z);
+        (void)memcpy(vert->z[a], z, sizeof z);
     }
+    return count;
 }
 
 /* List the active vertices and factor their system. Return 0, or the place in the list of the first
- * vertex that depends on those before it. */
+ * vertex that depends on those before it, or -1 where an assertion failed. */
 int NAME(factor_vertices)(vertices_t *vert, workspace_t *work, const data_t *data, const point_t *point)
 {
     int a, b, k;
-    list_vertices(vert, work, data, point);
-    for (a = 0; a < vert->count; ++a) {
+    const int n = list_vertices(vert, work, data, point);
+    if (!GNC_ASSERT(is_within(n, 1, A))) {
+        return -1;
+    }
+    for (a = 0; a < n; ++a) {
         multiply(work->Tt, vert->z[a], vert->J[a]);
     }
-    for (a = 1; a < vert->count; ++a) {
+    for (a = 1; a < n; ++a) {
         real diagonal, pivot, raw[A];
         for (k = 0; k < K; ++k) {
             vert->J[a][k] -= vert->J[0][k];
@@ -156,6 +190,9 @@ int NAME(factor_vertices)(vertices_t *vert, workspace_t *work, const data_t *dat
             vert->G[a][b] = entry * vert->inv_G[b];
             pivot -= entry * vert->G[a][b];
         }
+        if (!GNC_ASSERT(is_finite(pivot))) {
+            return -1;
+        }
         if (pivot <= DEPENDENT * diagonal + TINY) {
             return a;
         }
@@ -164,31 +201,20 @@ int NAME(factor_vertices)(vertices_t *vert, workspace_t *work, const data_t *dat
     return 0;
 }
 
-/* The full step. An empty list of vertices means: hold the vertex weights as they are. */
-void NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
-                       const command_t *command, const point_t *point)
+/* What the n vertex weights gain by the step; return the rise dt of the worst error. What each tie lacks
+ * compared with the first, through the factors of G. Adds to eps what they add to the step. */
+static real weigh_vertices(const vertices_t *vert, int n, const point_t *point, const real *d0, real *eps,
+                           real *dlambda)
 {
-    int i, k, a, b, j, v;
-    const int n = vert->count;
-    const real t = n > 0 ? point->q[vert->list[0]] : point->worst;
-    real d0[K] = {0}, eps[K], dy[K], nu[K], dlambda[A], dt = 0;
-    for (i = 0; i < N; ++i) {
-        const real bound = work->side[i] < 0 ? command->lower[i] : command->upper[i];
-        const real d = work->side[i] ? bound - work->force[i] : -data->inv_curvature[i] * point->g[i];
-        goal->force[i] = d;
-        for (k = 0; k < K; ++k) {
-            d0[k] += data->St[i][k] * d;
-        }
-    }
-    multiply(work->W, d0, nu);
-    multiply(work->Tt, nu, eps);
-    /* vertex weights: what each tie lacks compared with the first, through the factors of G */
+    int k, a, b;
+    real dt;
     dlambda[0] = 0;
-    if (n > 0) {
-        dt = product(vert->z[0], d0) - product(vert->J[0], eps);
+    if (n == 0 || !GNC_ASSERT(is_within(n, 1, A))) {
+        return 0;
     }
+    dt = product(vert->z[0], d0) - product(vert->J[0], eps);
     for (a = 1; a < n; ++a) {
-        dlambda[a] = point->q[vert->list[a]] - t - product(vert->J[a], eps);
+        dlambda[a] = point->q[vert->list[a]] - point->q[vert->list[0]] - product(vert->J[a], eps);
         for (k = 0; k < K; ++k) {
             dlambda[a] += (vert->z[a][k] - vert->z[0][k]) * d0[k];
         }
@@ -209,12 +235,55 @@ void NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, 
             eps[k] += vert->J[a][k] * dlambda[a];
         }
     }
+    return dt;
+}
+
+/* Slack of every vertex where the step leads: the worst error there, t, less its own. */
+static void slack_at(goal_t *goal, const data_t *data, const point_t *point, const real *dy, real t)
+{
+    int a, j, v;
+    for (v = 0; v < V; ++v) {
+        goal->slack[v] = t - point->q[v];
+    }
+    for (a = 0; a < R; ++a) {
+        for (v = 0; v < V; ++v) {
+            real move = dy[a];
+            for (j = 0; j < P; ++j) {
+                move += data->D[a][j][v] * dy[R + j];
+            }
+            goal->slack[v] -= move * point->r[a][v];
+        }
+    }
+}
+
+/* The full step. An empty list of vertices means: hold the vertex weights as they are. */
+int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
+                      const command_t *command, const point_t *point)
+{
+    int i, k, a;
+    const int n = vert->count;
+    real d0[K] = {0}, eps[K], dy[K], nu[K], dlambda[A], t, dt;
+    if (!GNC_ASSERT(is_within(n, 0, A))) {
+        return 0;
+    }
+    t = n > 0 ? point->q[vert->list[0]] : point->worst;
+    for (i = 0; i < N; ++i) {
+        const real bound = work->side[i] < 0 ? command->lower[i] : command->upper[i];
+        const real d = work->side[i] != 0 ? bound - work->force[i] : -data->inv_curvature[i] * point->g[i];
+        goal->force[i] = d;
+        for (k = 0; k < K; ++k) {
+            d0[k] += data->St[i][k] * d;
+        }
+    }
+    multiply(work->W, d0, nu);
+    multiply(work->Tt, nu, eps);
+    dt = weigh_vertices(vert, n, point, d0, eps, dlambda);
     multiply(work->T, eps, dy);
     for (k = 0; k < K; ++k) {
         dy[k] = d0[k] - dy[k];
     }
     multiply(work->W, dy, nu);
-    memcpy(goal->lambda, work->lambda, sizeof goal->lambda);
+    (void)memcpy(goal->lambda, work->lambda, sizeof goal->lambda);
     for (a = 0; a < n; ++a) {
         for (k = 0; k < K; ++k) {
             nu[k] += vert->z[a][k] * dlambda[a];
@@ -226,19 +295,9 @@ void NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, 
         for (k = 0; k < K; ++k) {
             g += data->S[k][i] * nu[k];
         }
-        goal->bound[i] = work->side[i] ? g + data->q[i] * goal->force[i] : 0;
-        goal->force[i] = work->force[i] + (work->side[i] ? goal->force[i] : -g * data->inv_curvature[i]);
+        goal->bound[i] = work->side[i] != 0 ? g + data->q[i] * goal->force[i] : 0;
+        goal->force[i] = work->force[i] + (work->side[i] != 0 ? goal->force[i] : -g * data->inv_curvature[i]);
     }
-    for (v = 0; v < V; ++v) {
-        goal->slack[v] = t + dt - point->q[v];
-    }
-    for (a = 0; a < R; ++a) {
-        for (v = 0; v < V; ++v) {
-            real move = dy[a];
-            for (j = 0; j < P; ++j) {
-                move += data->D[a][j][v] * dy[R + j];
-            }
-            goal->slack[v] -= move * point->r[a][v];
-        }
-    }
+    slack_at(goal, data, point, dy, t + dt);
+    return GNC_ASSERT(is_finite(dt));
 }

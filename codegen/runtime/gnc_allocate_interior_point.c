@@ -13,7 +13,7 @@
  */
 #include "gnc_allocate_internal.h"
 
-enum { MAX_ITERATIONS = 30 };
+enum { MAX_STEPS = 30 };
 #define SHORT_STEP (real)0.1 /* a step this short did not pay: centre instead */
 #define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
                               * easy problems and loses the way in degenerate ones */
@@ -47,8 +47,8 @@ static void aim(target_t *target, const direction_t *dir, const command_t *comma
     for (i = 0; i < N; ++i) {
         const real cross = second_order * dir->zl[i] * dir->F[i];
         const real cross_up = second_order * dir->zu[i] * dir->F[i];
-        target->zl[i] = command->dead[i] ? 0 : mu - cross;
-        target->zu[i] = command->dead[i] ? 0 : mu + cross_up;
+        target->zl[i] = command->dead[i] != 0 ? 0 : mu - cross;
+        target->zu[i] = command->dead[i] != 0 ? 0 : mu + cross_up;
     }
     for (v = 0; v < V; ++v) {
         target->lambda[v] = mu - second_order * dir->lambda[v] * dir->rise[v];
@@ -78,27 +78,29 @@ static real mean_product(const direction_t *dir, const iterate_t *it, real step,
 static int start(iterate_t *it, real *force, const data_t *data, const command_t *command, point_t *point)
 {
     int i, v, products = V;
+    const real count = (real)(int)V;
     real mu = 0;
     for (i = 0; i < N; ++i) {
         it->down[i] = (real)0.5 * (command->upper[i] - command->lower[i]);
         it->up[i] = it->down[i];
         force[i] = command->lower[i] + it->down[i];
-        if (command->dead[i]) {
+        if (command->dead[i] != 0) {
             force[i] = command->lower[i];
-            it->down[i] = it->up[i] = 1;
+            it->down[i] = 1;
+            it->up[i] = 1;
         }
     }
     NAME(residuals)(data, command, force, point);
     it->t = larger(2 * point->worst, command->floor) + TINY;
     for (v = 0; v < V; ++v) {
-        it->lambda[v] = 1 / (real)(int)V;
+        it->lambda[v] = 1 / count;
         it->s[v] = it->t - point->q[v];
-        mu += it->s[v] / (real)(V * V);
+        mu += it->s[v] / (count * count);
     }
     for (i = 0; i < N; ++i) {
-        it->zl[i] = command->dead[i] ? 0 : mu / it->down[i];
+        it->zl[i] = command->dead[i] != 0 ? 0 : mu / it->down[i];
         it->zu[i] = it->zl[i];
-        products += command->dead[i] ? 0 : 2;
+        products += command->dead[i] != 0 ? 0 : 2;
     }
     return products;
 }
@@ -112,8 +114,22 @@ static void rest(workspace_t *work, const data_t *data, const command_t *command
     for (i = 0; i < N; ++i) {
         work->force[i] = larger(command->lower[i], smaller(command->upper[i], command->previous[i]));
     }
-    memcpy(work->lambda, lambda, sizeof work->lambda);
+    (void)memcpy(work->lambda, lambda, sizeof work->lambda);
     NAME(evaluate)(data, command, work->force, work->lambda, point);
+}
+
+/* Which bound an actuator is at: one whose multiplier outweighs what the weights' curvature does with the room. */
+static int8_t side_of(const iterate_t *it, const data_t *data, int i)
+{
+    int8_t side = 0;
+    if (it->zl[i] > data->q[i] * it->down[i] && it->down[i] < it->up[i]) {
+        side = -1;
+    } else if (it->zu[i] > data->q[i] * it->up[i] && it->up[i] < it->down[i]) {
+        side = 1;
+    } else {
+        side = 0;
+    }
+    return side;
 }
 
 /* Record the point for the caller and for the next warm start. */
@@ -121,94 +137,131 @@ static void keep(workspace_t *work, const data_t *data, const iterate_t *it, con
 {
     int i, v;
     for (i = 0; i < N; ++i) {
-        /* at a bound if the multiplier outweighs what the weights' curvature does with the room */
-        work->side[i] = it->zl[i] > data->q[i] * it->down[i] && it->down[i] < it->up[i]   ? -1
-                        : it->zu[i] > data->q[i] * it->up[i] && it->up[i] < it->down[i] ? 1
-                                                                                        : 0;
-        work->bound[i] = work->side[i] ? point->g[i] : 0;
+        work->side[i] = side_of(it, data, i);
+        work->bound[i] = work->side[i] != 0 ? point->g[i] : 0;
     }
     for (v = 0; v < V; ++v) { /* a copy hands its weight to the original */
         const real weight = work->lambda[v];
+        int original = data->original[v];
+        if (!GNC_ASSERT(is_within(original, 0, v))) {
+            original = v; /* damaged data must not lead out of bounds */
+        }
         work->lambda[v] = 0;
-        work->lambda[data->original[v]] += weight;
+        work->lambda[original] += weight;
     }
     for (v = 0; v < V; ++v) {
         work->slack[v] = point->worst - point->q[v];
-        work->active[v] = work->lambda[v] * larger(point->worst, TINY) > work->slack[v];
+        work->active[v] = (int8_t)(work->lambda[v] * larger(point->worst, TINY) > work->slack[v] ? 1 : 0);
     }
     work->warm = 1;
+}
+
+/* Mean of all products multiplier * room. */
+static real mean_now(const iterate_t *it, int products)
+{
+    int i, v;
+    real sum = 0;
+    for (i = 0; i < N; ++i) {
+        sum += it->zl[i] * it->down[i] + it->zu[i] * it->up[i];
+    }
+    for (v = 0; v < V; ++v) {
+        sum += it->lambda[v] * it->s[v];
+    }
+    return sum / (real)products;
+}
+
+/* Take a step. Each force is measured from its nearer bound, so that none is lost in rounding. */
+static void advance(iterate_t *it, real *force, const direction_t *dir, const command_t *command, real step)
+{
+    int i, v;
+    for (i = 0; i < N; ++i) {
+        it->down[i] += step * dir->F[i];
+        it->up[i] -= step * dir->F[i];
+        it->zl[i] += step * dir->zl[i];
+        it->zu[i] += step * dir->zu[i];
+        force[i] = it->down[i] < it->up[i] ? command->lower[i] + it->down[i] : command->upper[i] - it->up[i];
+        if (command->dead[i] != 0) {
+            force[i] = command->lower[i];
+        }
+    }
+    for (v = 0; v < V; ++v) {
+        it->lambda[v] += step * dir->lambda[v];
+    }
+    it->t += step * dir->t;
+}
+
+/* The direction towards a target, and how far it may be followed: 0 where it cannot be computed. */
+static real towards(direction_t *dir, factors_t *fac, const target_t *target, const data_t *data,
+                    const iterate_t *it, const point_t *point)
+{
+    return NAME(interior_direction)(dir, fac, target, data, it, point) ? step_length(dir, it) : 0;
+}
+
+/* A predictor, a corrector, and if that leads nowhere a step back to the centre. */
+static int iterate(iterate_t *it, real *force, const data_t *data, const command_t *command, const point_t *point,
+                   int products)
+{
+    factors_t fac;
+    direction_t dir;
+    target_t target;
+    real step, sigma;
+    int v;
+    for (v = 0; v < V; ++v) {
+        it->s[v] = larger(it->t - point->q[v], EPS * it->t);
+    }
+    it->mu = mean_now(it, products);
+    if (!NAME(interior_factors)(&fac, data, command, it, point) || !GNC_ASSERT(it->mu > 0)) {
+        return 0;
+    }
+    (void)memset(&target, 0, sizeof target); /* predictor: all products to zero */
+    step = towards(&dir, &fac, &target, data, it, point);
+    sigma = mean_product(&dir, it, step, products) / it->mu;
+    aim(&target, &dir, command, sigma * sigma * sigma * it->mu, step, 1); /* corrector */
+    step = towards(&dir, &fac, &target, data, it, point);
+    if (step < SHORT_STEP) { /* some product lags far behind: no progress, back to the centre */
+        aim(&target, &dir, command, it->mu, 0, 0);
+        step = towards(&dir, &fac, &target, data, it, point);
+    }
+    if (!GNC_ASSERT(step > 0)) {
+        return 0;
+    }
+    advance(it, force, &dir, command, step);
+    return 1;
 }
 
 int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t *command,
                          point_t *point, int32_t *iterations)
 {
     iterate_t it;
-    factors_t fac;
-    direction_t dir;
-    target_t target;
     real force[N], best, last = -1;
-    int i, v, k;
+    int k, going;
     const int products = start(&it, force, data, command, point);
     rest(work, data, command, it.lambda, point);
     best = point->gap;
-    for (k = 0; !is_optimal(data, point); ++k) {
-        real step, sigma;
+    going = !is_optimal(data, point);
+    *iterations = 0;
+    for (k = 0; k <= MAX_STEPS && going; ++k) {
+        *iterations = k;
         NAME(evaluate)(data, command, force, it.lambda, point);
         if (point->gap < best) {
             best = point->gap;
-            memcpy(work->force, force, sizeof force);
-            memcpy(work->lambda, it.lambda, sizeof it.lambda);
+            (void)memcpy(work->force, force, sizeof force);
+            (void)memcpy(work->lambda, it.lambda, sizeof it.lambda);
         }
-        /* Below the rounding floor go on only while the gap still falls. */
-        if (is_optimal(data, point) || k == MAX_ITERATIONS || !is_finite(point->gap) ||
-            (best <= command->floor && point->gap > (real)0.9 * last)) {
-            break;
+        going = !is_optimal(data, point) && is_finite(point->gap);
+        if (best <= command->floor && point->gap > (real)0.9 * last) {
+            going = 0; /* below the rounding floor go on only while the gap still falls */
         }
         last = point->gap;
-        for (v = 0; v < V; ++v) {
-            it.s[v] = larger(it.t - point->q[v], EPS * it.t);
+        if (going && k < MAX_STEPS) {
+            going = iterate(&it, force, data, command, point, products);
         }
-        NAME(interior_factors)(&fac, data, command, &it, point);
-        memset(&target, 0, sizeof target); /* predictor: all products to zero */
-        NAME(interior_direction)(&dir, &fac, &target, data, &it, point);
-        step = step_length(&dir, &it);
-        it.mu = 0;
-        for (i = 0; i < N; ++i) {
-            it.mu += it.zl[i] * it.down[i] + it.zu[i] * it.up[i];
-        }
-        for (v = 0; v < V; ++v) {
-            it.mu += it.lambda[v] * it.s[v];
-        }
-        it.mu /= (real)products;
-        sigma = mean_product(&dir, &it, step, products) / it.mu;
-        aim(&target, &dir, command, sigma * sigma * sigma * it.mu, step, 1); /* corrector */
-        NAME(interior_direction)(&dir, &fac, &target, data, &it, point);
-        step = step_length(&dir, &it);
-        if (step < SHORT_STEP) { /* some product lags far behind: no progress, back to the centre */
-            aim(&target, &dir, command, it.mu, 0, 0);
-            NAME(interior_direction)(&dir, &fac, &target, data, &it, point);
-            step = step_length(&dir, &it);
-        }
-        for (i = 0; i < N; ++i) {
-            it.down[i] += step * dir.F[i];
-            it.up[i] -= step * dir.F[i];
-            it.zl[i] += step * dir.zl[i];
-            it.zu[i] += step * dir.zu[i];
-            force[i] = command->dead[i]          ? command->lower[i]
-                       : it.down[i] < it.up[i] ? command->lower[i] + it.down[i]
-                                               : command->upper[i] - it.up[i];
-        }
-        for (v = 0; v < V; ++v) {
-            it.lambda[v] += step * dir.lambda[v];
-        }
-        it.t += step * dir.t;
     }
-    *iterations = k;
     if (point->gap != best) { /* an earlier iterate was better */
         NAME(evaluate)(data, command, work->force, work->lambda, point);
     }
     keep(work, data, &it, point);
     /* With the added M1 the condition is 1e9: there 1e-5 of the objective can be all that is left. */
     return is_optimal(data, point) || point->gap <= command->floor ||
-           (data->regularised && point->gap <= (real)1e-5 * point->phi);
+           (data->regularised != 0 && point->gap <= (real)1e-5 * point->phi);
 }

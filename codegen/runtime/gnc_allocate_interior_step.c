@@ -18,7 +18,7 @@
 static void vertex_gradients(real (*z)[V], const data_t *data, const point_t *point)
 {
     int a, j, v;
-    memcpy(z, point->r, sizeof point->r);
+    (void)memcpy(z, point->r, sizeof point->r);
     for (j = 0; j < P; ++j) {
         for (v = 0; v < V; ++v) {
             real sum = 0;
@@ -33,11 +33,11 @@ static void vertex_gradients(real (*z)[V], const data_t *data, const point_t *po
 /* The triangle U of B = diag(s/lambda) + J'J = U'U by Householder reflections of the stacked matrix
  * [sqrt(diag); J]. Forming J'J would lose the diagonal in its rounding: with more vertices than rows of
  * J, or with tied ones, the diagonal alone decides how weight is shared among them. */
-static void factor_B(factors_t *fac, const iterate_t *it)
+static int factor_B(factors_t *fac, const iterate_t *it)
 {
-    int j, k, l;
+    int j, k, l, sound = 1;
     real left[K][V];
-    memcpy(left, fac->J, sizeof left);
+    (void)memcpy(left, fac->J, sizeof left);
     for (j = 0; j < V; ++j) {
         const real d2 = it->s[j] / it->lambda[j], d = SQUARE_ROOT(d2);
         real column[K], w[V] = {0}, norm = d2, inverse;
@@ -48,6 +48,8 @@ static void factor_B(factors_t *fac, const iterate_t *it)
                 w[l] += column[k] * left[k][l];
             }
         }
+        sound &= GNC_ASSERT(d2 > 0);
+        sound &= GNC_ASSERT(is_finite(norm));
         norm = SQUARE_ROOT(norm);
         inverse = 1 / norm;
         fac->inv_U[j] = inverse;
@@ -61,6 +63,7 @@ static void factor_B(factors_t *fac, const iterate_t *it)
             }
         }
     }
+    return sound;
 }
 
 /* x <- B^-1 x */
@@ -81,27 +84,31 @@ static void solve_B(const factors_t *fac, real *x)
     }
 }
 
-void NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
-                            const iterate_t *it, const point_t *point)
+/* L L' = S diag(1/d) S' */
+static int factor_actuators(factors_t *fac, const data_t *data, const command_t *command, const iterate_t *it)
 {
-    int i, k, l, v, e;
+    int i, k, l, e = 0;
     real packed[KT] = {0};
-    vertex_gradients(fac->z, data, point);
     for (i = 0; i < N; ++i) {
         const real d = data->curvature[i] + it->zl[i] / it->down[i] + it->zu[i] / it->up[i];
-        fac->invd[i] = command->dead[i] ? 0 : 1 / d;
-        for (e = 0; e < KT; ++e) {
-            packed[e] += data->SS[i][e] * fac->invd[i];
+        fac->invd[i] = command->dead[i] != 0 ? 0 : 1 / d;
+        for (k = 0; k < KT; ++k) {
+            packed[k] += data->SS[i][k] * fac->invd[i];
         }
     }
-    for (k = 0, e = 0; k < K; ++k) {
-        for (l = 0; l <= k; ++l, ++e) {
+    for (k = 0; k < K; ++k) {
+        for (l = 0; l <= k; ++l) {
             fac->L[k][l] = packed[e];
+            ++e;
         }
     }
-    factor(&fac->L[0][0], fac->inv_L, K, 2 * EPS);
-    NAME(inner_matrix)(data, it->lambda, fac->L, fac->W, fac->C);
-    factor(&fac->C[0][0], fac->inv_C, K, 0);
+    return NAME(factor)(fac->L, fac->inv_L, 2 * EPS);
+}
+
+/* J = C^-1 L' Z */
+static void project_vertices(factors_t *fac)
+{
+    int i, k, l, v;
     for (k = 0; k < K; ++k) {
         for (v = 0; v < V; ++v) {
             fac->J[k][v] = 0;
@@ -120,7 +127,18 @@ void NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t 
             fac->J[k][v] *= fac->inv_C[k];
         }
     }
-    factor_B(fac, it);
+}
+
+int NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
+                           const iterate_t *it, const point_t *point)
+{
+    int v, sound;
+    vertex_gradients(fac->z, data, point);
+    sound = factor_actuators(fac, data, command, it);
+    sound &= NAME(inner_matrix)(data, it->lambda, fac->L, fac->W, fac->C);
+    sound &= NAME(factor)(fac->C, fac->inv_C, 0);
+    project_vertices(fac);
+    sound &= factor_B(fac, it);
     for (v = 0; v < V; ++v) {
         fac->B1[v] = 1;
     }
@@ -129,23 +147,15 @@ void NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t 
     for (v = 0; v < V; ++v) {
         fac->sum_B1 += fac->B1[v];
     }
+    return sound & GNC_ASSERT(fac->sum_B1 > 0);
 }
 
-/* The direction towards the target products:
- *     d dF + S'(W dy + Z dlambda) = rho,   (s/lambda) dlambda + dt - Z'dy = beta,   sum lambda = 1 */
-void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const target_t *target,
-                              const data_t *data, const iterate_t *it, const point_t *point)
+/* The vertex weights of the direction, and what they leave of eps for the forces. */
+static void vertex_direction(direction_t *dir, const factors_t *fac, const target_t *target, const iterate_t *it,
+                           real *eps)
 {
-    int i, k, a, j, v;
-    real rho[N], eps[K] = {0}, dy[K] = {0}, nu[K], excess = -1;
-    for (i = 0; i < N; ++i) {
-        rho[i] = -point->g[i] + target->zl[i] / it->down[i] - target->zu[i] / it->up[i];
-        for (k = 0; k < K; ++k) {
-            eps[k] += data->St[i][k] * (rho[i] * fac->invd[i]);
-        }
-    }
-    forward(&fac->L[0][0], fac->inv_L, K, eps);
-    forward(&fac->C[0][0], fac->inv_C, K, eps);
+    int k, v;
+    real excess = -1;
     for (v = 0; v < V; ++v) {
         dir->lambda[v] = target->lambda[v] / it->lambda[v] - it->s[v] + target->bend[v];
         excess += it->lambda[v];
@@ -168,7 +178,13 @@ void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const targ
             eps[k] -= fac->J[k][v] * dir->lambda[v];
         }
     }
-    backward(&fac->C[0][0], fac->inv_C, K, eps);
+}
+
+/* nu = W L eps + Z dlambda, what pulls at the forces */
+static void pull_on_forces(real *nu, const direction_t *dir, const factors_t *fac, const real *eps)
+{
+    int i, k, v;
+    real dy[K] = {0};
     for (k = 0; k < K; ++k) {
         for (i = 0; i <= k; ++i) {
             dy[k] += fac->L[k][i] * eps[i];
@@ -183,18 +199,12 @@ void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const targ
             nu[k] += fac->z[k][v] * dir->lambda[v];
         }
     }
-    memset(dy, 0, sizeof dy);
-    for (i = 0; i < N; ++i) {
-        for (k = 0; k < K; ++k) {
-            rho[i] -= data->S[k][i] * nu[k];
-        }
-        dir->F[i] = rho[i] * fac->invd[i];
-        dir->zl[i] = (target->zl[i] - it->zl[i] * dir->F[i]) / it->down[i] - it->zl[i];
-        dir->zu[i] = (target->zu[i] + it->zu[i] * dir->F[i]) / it->up[i] - it->zu[i];
-        for (k = 0; k < K; ++k) {
-            dy[k] += data->St[i][k] * dir->F[i]; /* S dF: closer to the truth than L eps */
-        }
-    }
+}
+
+/* How the slacks change along the direction dy. */
+static void slack_along(direction_t *dir, const factors_t *fac, const data_t *data, const real *dy)
+{
+    int a, j, k, v;
     for (v = 0; v < V; ++v) {
         dir->rise[v] = dir->t;
         dir->bend[v] = 0;
@@ -213,4 +223,37 @@ void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const targ
             dir->bend[v] += (real)0.5 * move * move;
         }
     }
+}
+
+/* The direction towards the target products:
+ *     d dF + S'(W dy + Z dlambda) = rho,   (s/lambda) dlambda + dt - Z'dy = beta,   sum lambda = 1 */
+int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *target,
+                             const data_t *data, const iterate_t *it, const point_t *point)
+{
+    int i, k;
+    real rho[N], eps[K] = {0}, dy[K] = {0}, nu[K];
+    for (i = 0; i < N; ++i) {
+        rho[i] = -point->g[i] + target->zl[i] / it->down[i] - target->zu[i] / it->up[i];
+        for (k = 0; k < K; ++k) {
+            eps[k] += data->St[i][k] * (rho[i] * fac->invd[i]);
+        }
+    }
+    forward(fac->L, fac->inv_L, eps);
+    forward(fac->C, fac->inv_C, eps);
+    vertex_direction(dir, fac, target, it, eps);
+    backward(fac->C, fac->inv_C, eps);
+    pull_on_forces(nu, dir, fac, eps);
+    for (i = 0; i < N; ++i) {
+        for (k = 0; k < K; ++k) {
+            rho[i] -= data->S[k][i] * nu[k];
+        }
+        dir->F[i] = rho[i] * fac->invd[i];
+        dir->zl[i] = (target->zl[i] - it->zl[i] * dir->F[i]) / it->down[i] - it->zl[i];
+        dir->zu[i] = (target->zu[i] + it->zu[i] * dir->F[i]) / it->up[i] - it->zu[i];
+        for (k = 0; k < K; ++k) {
+            dy[k] += data->St[i][k] * dir->F[i]; /* S dF: closer to the truth than L eps */
+        }
+    }
+    slack_along(dir, fac, data, dy);
+    return GNC_ASSERT(is_finite(dir->t));
 }

@@ -15,8 +15,10 @@
 #ifndef GNC_ALLOCATE_INTERNAL_H
 #define GNC_ALLOCATE_INTERNAL_H
 
-#include <math.h> /* sqrt, nothing else */
 #include <string.h>
+#if !defined(__GNUC__)
+#include <math.h> /* sqrt, which gcc and clang know without a header */
+#endif
 
 #include "gnc_allocate.h"
 
@@ -24,11 +26,12 @@ enum {
     N = GNC_ALLOC_N,                        /* actuators */
     R = GNC_ALLOC_R,                        /* rows of the effort */
     P = GNC_ALLOC_P,                        /* rows of the uncertain part */
-    P1 = GNC_ALLOC_AT_LEAST_1(GNC_ALLOC_P), /* the same as an array size */
     V = GNC_ALLOC_V,                        /* vertices */
     K = GNC_ALLOC_K,                        /* rows of S */
     KT = GNC_ALLOC_TRIANGLE(GNC_ALLOC_K),   /* entries of a lower triangle, packed by rows */
-    A = K + 2                               /* more active vertices are always dependent */
+    A = K + 2,                              /* more active vertices are always dependent */
+    READY = 0x5EA1,                         /* mark of data that the set-up has filled */
+    NOTHING = -1                            /* no obstacle; else actuator i is i and vertex v is N + v */
 };
 
 #define NAME(word) GNC_ALLOC_NAME(word)
@@ -38,27 +41,43 @@ typedef NAME(data) data_t;
 typedef NAME(workspace) workspace_t;
 typedef NAME(result) result_t;
 
-#ifdef GNC_ALLOC_REAL_FLOAT
+/* What must hold where it stands. Never stops the processor: 1 or 0, and beside it what happens if not, so that
+ * in the end the call holds its last forces and says so. A project may define it to note file and line as well. */
+#ifndef GNC_ASSERT
+#define GNC_ASSERT(condition) ((condition) ? 1 : 0)
+#endif
+
+#if defined(__GNUC__) && defined(GNC_ALLOC_REAL_FLOAT)
+#define SQUARE_ROOT(a) __builtin_sqrtf(a)
+#elif defined(__GNUC__)
+#define SQUARE_ROOT(a) __builtin_sqrt(a)
+#elif defined(GNC_ALLOC_REAL_FLOAT)
 #define SQUARE_ROOT(a) sqrtf(a)
+#else
+#define SQUARE_ROOT(a) sqrt(a)
+#endif
+
+#ifdef GNC_ALLOC_REAL_FLOAT
 #define EPS 1.1920929e-7F /* distance from 1 to the next number */
 #define TINY 1e-30F
 #define DEFAULT_TOLERANCE 1e-3F
 #define ROUNDING_FLOOR 2e-6F
 #define CURVATURE_FLOOR 1e-6F
 #else
-#define SQUARE_ROOT(a) sqrt(a)
 #define EPS 2.220446049250313e-16
 #define TINY 1e-200
 #define DEFAULT_TOLERANCE 1e-8
 #define ROUNDING_FLOOR 5e-15  /* gap, of the size of phi over the box, that rounding explains */
 #define CURVATURE_FLOOR 1e-10 /* least curvature of a Newton step, of that of the torque error */
 #endif
+#define OFF_SIMPLEX (64 * (real)(int)V * EPS) /* of the sum of the vertex weights: more is no rounding */
 
 /* min, max and size as comparisons: fmin and fmax differ between compilers on signed zeros. */
 static inline real smaller(real a, real b) { return a < b ? a : b; }
 static inline real larger(real a, real b) { return a > b ? a : b; }
 static inline real size_of(real a) { return a < 0 ? -a : a; }
 static inline int is_finite(real a) { return a - a == 0; }
+static inline int is_within(int value, int least, int most) { return value < least ? 0 : value <= most; }
 
 /* One checked command: what the solvers work on. */
 typedef struct {
@@ -127,24 +146,34 @@ static inline int is_optimal(const data_t *data, const point_t *point)
     return point->gap <= data->tolerance * point->phi;
 }
 
+/* Functions that return int without a word about it return 1, or 0 where an assertion failed: rounding,
+ * overflow or damaged memory have spoilt the numbers, and the caller gives up the way it was going. */
+
 /* gnc_allocate_point.c */
 void NAME(residuals)(const data_t *data, const command_t *command, const real *force, point_t *point);
 void NAME(evaluate)(const data_t *data, const command_t *command, const real *force,
                     const real *lambda, point_t *point);
 real NAME(floor_of)(const data_t *data, const command_t *command);
-void NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K]);
+int NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K]);
+int NAME(factor)(real (*matrix)[K], real *inverse, real lost);
 
 /* gnc_allocate_direction.c */
-void NAME(refresh_factors)(workspace_t *work, const data_t *data, int always);
+int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always);
 int NAME(factor_vertices)(vertices_t *vert, workspace_t *work, const data_t *data, const point_t *point);
-void NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
-                       const command_t *command, const point_t *point);
+int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
+                      const command_t *command, const point_t *point);
 
 /* gnc_allocate_interior_step.c */
-void NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
-                            const iterate_t *it, const point_t *point);
-void NAME(interior_direction)(direction_t *dir, const factors_t *fac, const target_t *target,
-                              const data_t *data, const iterate_t *it, const point_t *point);
+int NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
+                           const iterate_t *it, const point_t *point);
+int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *target,
+                             const data_t *data, const iterate_t *it, const point_t *point);
+
+/* gnc_allocate_exchange.c: bring the factors up to date after exchanging vertices until the active ones are
+ * independent. Return 0 where rounding hides which ones are. */
+int NAME(independent_vertices)(vertices_t *vert, workspace_t *work, const data_t *data,
+                               const command_t *command, point_t *point, int newcomer, int always);
+void NAME(change_set)(workspace_t *work, int which, int upwards);
 
 /* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: return 1 if the answer in the workspace
  * is certified; the point belongs to that answer. */
@@ -155,52 +184,26 @@ int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, 
 
 /* ---- small dense algebra: lower triangles, inverse diagonals ---------------------------------- */
 
-/* A = L L' in place. A pivot lost in rounding becomes a zero column: S may have dependent rows
- * (wheels), and few actuators may be free. */
-static inline void factor(real *matrix, real *inverse, int size, real lost)
-{
-    int i, j, k;
-    for (j = 0; j < size; ++j) {
-        real *row = matrix + j * size;
-        real pivot = row[j];
-        const real smallest = lost * pivot;
-        for (k = 0; k < j; ++k) {
-            pivot -= row[k] * row[k];
-        }
-        /* sqrt(p) and 1/p do not wait for each other, as 1/sqrt(p) would */
-        row[j] = pivot > smallest ? SQUARE_ROOT(pivot) : 0;
-        inverse[j] = pivot > smallest ? row[j] * (1 / pivot) : 0;
-        for (i = j + 1; i < size; ++i) {
-            real entry = matrix[i * size + j];
-            for (k = 0; k < j; ++k) {
-                entry -= matrix[i * size + k] * row[k];
-            }
-            matrix[i * size + j] = entry * inverse[j];
-            row[i] = 0;
-        }
-    }
-}
-
 /* x <- L^-1 x */
-static inline void forward(const real *L, const real *inverse, int size, real *x)
+static inline void forward(real (*L)[K], const real *inverse, real *x)
 {
     int i, k;
-    for (i = 0; i < size; ++i) {
+    for (i = 0; i < K; ++i) {
         for (k = 0; k < i; ++k) {
-            x[i] -= L[i * size + k] * x[k];
+            x[i] -= L[i][k] * x[k];
         }
         x[i] *= inverse[i];
     }
 }
 
 /* x <- L^-T x */
-static inline void backward(const real *L, const real *inverse, int size, real *x)
+static inline void backward(real (*L)[K], const real *inverse, real *x)
 {
     int i, k;
-    for (i = size - 1; i >= 0; --i) {
+    for (i = K - 1; i >= 0; --i) {
         x[i] *= inverse[i];
         for (k = 0; k < i; ++k) {
-            x[k] -= L[i * size + k] * x[i];
+            x[k] -= L[i][k] * x[i];
         }
     }
 }

@@ -16,7 +16,7 @@ void NAME(residuals)(const data_t *data, const command_t *command, const real *f
             y[k] += data->St[i][k] * force[i];
         }
     }
-    memcpy(point->y, y, sizeof y);
+    (void)memcpy(point->y, y, sizeof y);
     for (v = 0; v < V; ++v) {
         point->q[v] = 0;
     }
@@ -113,35 +113,45 @@ real NAME(floor_of)(const data_t *data, const command_t *command)
     return (real)ROUNDING_FLOOR * (weights + larger(2 * corner.worst, box));
 }
 
-/* W = sum lambda_v [I D_v]'[I D_v], the curvature of the lambda-weighted function in y, and the lower
- * triangle of I + L' W L. With L L' = S diag(1/d) S' the latter carries the whole Newton system, and
- * its eigenvalues are 1 or more: safe to factor whatever the data. */
-void NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K])
+/* W = sum lambda_v [I D_v]'[I D_v], the curvature of the lambda-weighted function in y; return sum lambda_v. */
+static real curvature_in_y(const data_t *data, const real *lambda, real (*W)[K])
 {
-    int i, k, l, v, e;
-    real WL[K][K], sum = 0;
-    memset(W, 0, K * sizeof *W);
+    int k, l, v;
+    real sum = 0;
+    (void)memset(W, 0, K * sizeof *W);
     for (v = 0; v < V; ++v) {
         if (lambda[v] > 0) {
+            int e = 0;
             sum += lambda[v];
-            for (k = 0, e = 0; k < P; ++k) {
+            for (k = 0; k < P; ++k) {
                 for (l = 0; l < R; ++l) {
                     W[R + k][l] += lambda[v] * data->Dv[v][l][k];
                 }
-                for (l = 0; l <= k; ++l, ++e) {
+                for (l = 0; l <= k; ++l) {
                     W[R + k][R + l] += lambda[v] * data->DD[v][e];
+                    ++e;
                 }
             }
         }
     }
+    for (k = 0; k < R; ++k) {
+        W[k][k] = sum;
+    }
     for (k = 0; k < K; ++k) {
-        if (k < R) {
-            W[k][k] = sum;
-        }
         for (l = 0; l < k; ++l) {
             W[l][k] = W[k][l];
         }
     }
+    return sum;
+}
+
+/* W as above, and the lower triangle of C = I + L' W L. With L L' = S diag(1/d) S' the latter carries the
+ * whole Newton system, and its eigenvalues are 1 or more: safe to factor whatever the data. */
+int NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K])
+{
+    int i, k, l;
+    real WL[K][K];
+    const real sum = curvature_in_y(data, lambda, W);
     for (k = 0; k < K; ++k) {
         real row[K] = {0};
         for (i = 0; i < K; ++i) {
@@ -149,7 +159,7 @@ void NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], re
                 row[l] += W[k][i] * L[i][l];
             }
         }
-        memcpy(WL[k], row, sizeof row);
+        (void)memcpy(WL[k], row, sizeof row);
     }
     for (k = 0; k < K; ++k) {
         real row[K] = {0};
@@ -159,6 +169,35 @@ void NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], re
                 row[l] += L[i][k] * WL[i][l];
             }
         }
-        memcpy(C[k], row, sizeof row);
+        (void)memcpy(C[k], row, sizeof row);
     }
+    return GNC_ASSERT(sum > 0);
+}
+
+/* A = L L' in place. A pivot lost in rounding becomes a zero column: S may have dependent rows
+ * (wheels), and few actuators may be free. */
+int NAME(factor)(real (*matrix)[K], real *inverse, real lost)
+{
+    int i, j, k, sound = 1;
+    for (j = 0; j < K; ++j) {
+        real *row = matrix[j];
+        real pivot = row[j];
+        const real smallest = lost * pivot;
+        for (k = 0; k < j; ++k) {
+            pivot -= row[k] * row[k];
+        }
+        sound &= GNC_ASSERT(is_finite(pivot));
+        /* sqrt(p) and 1/p do not wait for each other, as 1/sqrt(p) would */
+        row[j] = pivot > smallest ? SQUARE_ROOT(pivot) : 0;
+        inverse[j] = pivot > smallest ? row[j] * (1 / pivot) : 0;
+        for (i = j + 1; i < K; ++i) {
+            real entry = matrix[i][j];
+            for (k = 0; k < j; ++k) {
+                entry -= matrix[i][k] * row[k];
+            }
+            matrix[i][j] = entry * inverse[j];
+            row[i] = 0;
+        }
+    }
+    return sound;
 }

@@ -11,9 +11,7 @@
 #ifndef GNC_MATHF_H
 #define GNC_MATHF_H
 
-#include <math.h>
 #include <stdint.h>
-#include <string.h>
 
 #if defined(__FAST_MATH__)
 #error "gnc_math needs IEEE arithmetic: build without -ffast-math"
@@ -26,11 +24,20 @@
 #define GNC_INLINE static inline
 #endif
 
-/* memcpy, which reads bits without breaking the aliasing rules; by this name -ffreestanding leaves no call behind. */
+/*
+ * The square root, and memcpy, which reads bits without breaking the aliasing rules. gcc and clang know them without a
+ * header, and by these names -ffreestanding leaves no call of memcpy behind.
+ */
 #if defined(__GNUC__)
 #define GNC_COPY_ __builtin_memcpy
+#define GNC_ROOT_ __builtin_sqrt
+#define GNC_ROOTF_ __builtin_sqrtf
 #else
+#include <math.h>
+#include <string.h>
 #define GNC_COPY_ memcpy
+#define GNC_ROOT_ sqrt
+#define GNC_ROOTF_ sqrtf
 #endif
 
 /* ---- Building blocks ------------------------------------------------------------------------------- */
@@ -44,13 +51,13 @@ typedef struct {
 
 GNC_INLINE uint32_t gnc_bitsf_(float x) {
     uint32_t u;
-    GNC_COPY_(&u, &x, sizeof u);
+    (void)GNC_COPY_(&u, &x, sizeof u);
     return u;
 }
 
 GNC_INLINE float gnc_from_bitsf_(uint32_t u) {
     float x;
-    GNC_COPY_(&x, &u, sizeof x);
+    (void)GNC_COPY_(&x, &u, sizeof x);
     return x;
 }
 
@@ -119,7 +126,11 @@ GNC_INLINE float gnc_poly3f_(float x, float c0, float c1, float c2) { return c0 
 
 /* ---- Exact functions ------------------------------------------------------------------------------- */
 
+#if defined(__GNUC__) /* one instruction */
+GNC_INLINE float gnc_fabsf(float x) { return __builtin_fabsf(x); }
+#else
 GNC_INLINE float gnc_fabsf(float x) { return gnc_from_bitsf_(gnc_bitsf_(x) & UINT32_C(0x7fffffff)); }
+#endif
 
 GNC_INLINE float gnc_copysignf(float x, float y) {
     const uint32_t sign = UINT32_C(0x80000000);
@@ -132,9 +143,13 @@ GNC_INLINE float gnc_signf(float x) {
     return x > 0.0f ? 1.0f : negative;
 }
 
+/* The smaller and the larger, by one comparison: when it is false (equal, zeros of two signs, a NaN), the second. */
+GNC_INLINE float gnc_minf(float x, float y) { return x < y ? x : y; }
+GNC_INLINE float gnc_maxf(float x, float y) { return x > y ? x : y; }
+
 /* The IEEE square root: 0.5 ulp. Never asked for a negative number: that NaN differs between processors. */
 GNC_INLINE float gnc_sqrtf(float x) {
-    const float root = sqrtf(x > 0.0f ? x : 0.0f);
+    const float root = GNC_ROOTF_(x > 0.0f ? x : 0.0f);
     const float keep_zero = x > 0.0f ? root : x;
     return x >= 0.0f ? keep_zero : gnc_nanf_();
 }
@@ -283,7 +298,7 @@ typedef struct {
 GNC_INLINE gnc_log_partsf_ gnc_log_reducef_(float x) {
     const float up = x < 0x1p-126f ? 0x1p25f : 1.0f; /* subnormal numbers have no exponent to read */
     const uint32_t bits = gnc_bitsf_(x * up);
-    const uint32_t biased = (bits - UINT32_C(0x3f3504f3) + (UINT32_C(128) << 23)) >> 23;
+    const uint32_t biased = (bits - UINT32_C(0x3f3504f3) + UINT32_C(0x40000000)) >> 23;
     gnc_log_partsf_ p;
     p.m = gnc_from_bitsf_(bits - ((biased - 128u) << 23));
     p.k = (gnc_from_bitsf_(gnc_bitsf_(0x1p23f) + biased) - (0x1p23f + 128.0f)) - (up > 1.0f ? 25.0f : 0.0f);
@@ -486,7 +501,7 @@ GNC_INLINE float gnc_asin_restf_(float s, float z) {
 /* asin of sqrt((1 - a)/2) for 1/2 <= a <= 1 as a sum; half the angle from a to 1, the root's rounding undone. */
 GNC_INLINE gnc_pairf_ gnc_asin_rootf_(float a) {
     const float z = a < 1.0f ? 0.5f - 0.5f * a : 0.0f;
-    const float root = sqrtf(z);
+    const float root = GNC_ROOTF_(z);
     const float square = root * root;
     const float missing = (z - square) - gnc_product_errorf_(root, root, square);
     gnc_pairf_ s;

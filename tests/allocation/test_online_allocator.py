@@ -84,6 +84,7 @@ def small_build(tmp_path, *flags):
                 "-std=c99",
                 "-Os",
                 "-ffp-contract=off",
+                "-fno-asynchronous-unwind-tables",  # for C++ exceptions and debuggers: no code, not on board
                 *flags,
                 *oa.defines(12, 3, 3, 8),
                 "-c",

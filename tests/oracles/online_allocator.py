@@ -15,9 +15,7 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 SOURCES = HERE.parents[1] / "codegen" / "runtime"
-SOLVER_FILES = tuple(
-    f"gnc_allocate{part}.c" for part in ("", "_point", "_direction", "_active_set", "_interior_step", "_interior_point")
-)
+SOLVER_FILES = tuple(sorted(path.name for path in SOURCES.glob("gnc_allocate*.c")))
 FAST_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math")  # same words as without, but gcc vectorises
 WARM, COLD, INTERIOR_POINT = 0, 1, 2
 OPTIMAL, AT_ROUNDING, NOT_CERTIFIED, BAD_COMMAND, BAD_PROBLEM = range(5)

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: MIT-0
+"""The same source, built by several compilers at several levels, scalar and as vector code, gives the same bits."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import platform
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from math_functions import (
+    FUNCTIONS,
+    HEADERS,
+    ONE_ARGUMENT,
+    PRECISIONS,
+    RUNTIME,
+    WARNINGS,
+    Library,
+    Precision,
+    build_all,
+    builds_of,
+    by_name,
+    compiler,
+    is_gnu,
+    loops_source,
+    zig,
+)
+from math_truth import SPECIAL, any_finite, arguments
+
+#: The zig compiler is asked where its wheel is installed.
+COMPILERS = ["gcc", "clang", *(["zig"] if zig() else [])]
+
+
+@pytest.fixture(scope="module")
+def builds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    return build_all(tmp_path_factory.mktemp("gnc_math"), COMPILERS)
+
+
+# ---- The same bits everywhere -------------------------------------------------------------------------------
+
+IDENTITY_POINTS = 100_000 // (2 * len(FUNCTIONS))
+
+
+def identity_arguments(name: str, p: Precision) -> list[np.ndarray]:
+    """Arguments inside and outside the stated range, special values included."""
+    rng = np.random.default_rng(7)
+    columns = arguments(name, p, IDENTITY_POINTS)
+    wild = [any_finite(rng, p, columns[0].size) for _ in columns]
+    size = min(w.size for w in wild)
+    special = zip(*SPECIAL[name], strict=True)  # the last of its columns, the expected values, has no partner here
+    return [np.concatenate([c, w[:size], s]).astype(p.dtype) for c, w, s in zip(columns, wild, special, strict=False)]
+
+
+@functools.cache
+def all_identity_arguments() -> dict[tuple[str, Precision], list[np.ndarray]]:
+    return {(name, p): identity_arguments(name, p) for p in PRECISIONS for name in FUNCTIONS}
+
+
+def digests(path: Path) -> dict[str, str]:
+    library = Library(path)
+    return {
+        name + p.suffix: hashlib.sha256(library(name, p, *columns).tobytes()).hexdigest()
+        for (name, p), columns in all_identity_arguments().items()
+    }
+
+
+@pytest.fixture(scope="module")
+def reference_digests(builds: dict[str, Path]) -> dict[str, str]:
+    label = "gcc-O0" if "gcc-O0" in builds else "clang-O0"
+    return digests(builds[label])
+
+
+@pytest.mark.parametrize("name", COMPILERS)
+def test_every_build_gives_the_same_bits(builds: dict[str, Path], name: str, request: pytest.FixtureRequest):
+    if name != "zig":
+        compiler(name)
+    reference = request.getfixturevalue("reference_digests")
+    for label in builds_of(name):
+        assert digests(builds[label]) == reference, f"{label} differs from the unoptimised scalar build"
+
+
+def test_gcc_vectorises_every_function(builds: dict[str, Path]):
+    """Branch-free in fact and not only in intention: a data-dependent jump would stop the vectoriser.
+
+    Plain SSE2 cannot compare integers of 64 bits, so that only the wider instruction sets are asked for everything.
+    """
+    if not is_gnu(compiler("gcc")) or platform.machine() not in ("x86_64", "AMD64"):
+        pytest.skip("the report read here is that of GNU gcc for x86-64")
+    lines = loops_source().splitlines()
+    loops = {i for i, line in enumerate(lines, 1) if " LOOP for " in line}
+    assert len(loops) == 2 * len(FUNCTIONS)
+    for label in builds_of("gcc"):
+        report = builds[label].with_suffix(".txt")
+        if "-lanes-avx" in label:
+            found = re.findall(r"loops\.c:(\d+):\d+: \S+ loop vectorized", report.read_text())
+            missing = loops - {int(line) for line in found}
+            assert not missing, (label, [lines[i - 1] for i in sorted(missing)])
+
+
+# ---- The headers as source ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["gcc", "clang", "g++", "clang++"])
+@pytest.mark.parametrize("level", ["-O0", "-O2"])
+def test_headers_compile_without_a_warning(name: str, level: str, tmp_path: Path):
+    plus = name.endswith("++")
+    for header in HEADERS.values():
+        source = tmp_path / f"{header.stem}.{'cpp' if plus else 'c'}"
+        source.write_text(f'#include "{header.name}"\n#include "{header.name}"\n')
+        language = ["-std=c++17"] if plus else ["-std=c99", "-Wmissing-prototypes"]
+        command = [compiler(name), *language, *WARNINGS, "-Wdouble-promotion", level, f"-I{RUNTIME}", "-c", str(source)]
+        result = subprocess.run([*command, "-o", str(tmp_path / "out.o")], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+
+
+def without_comments(header: Path) -> str:
+    return re.sub(r"/\*.*?\*/", " ", header.read_text(), flags=re.DOTALL)
+
+
+def test_float_functions_keep_to_float(tmp_path: Path):
+    """No declaration, constant, promotion or call of double: each is an error in this build."""
+    assert not re.search(r"\b(double|uint64_t|long)\b", without_comments(HEADERS["float"]))
+    lines = ['#include "gnc_mathf.h"']
+    for name in FUNCTIONS:
+        call = f"gnc_{name}f({'a' if name in ONE_ARGUMENT else 'a, b'})"
+        lines.append(f"float use_{name}(float a, float b);")
+        lines.append(f"float use_{name}(float a, float b) {{ (void)b; return {call}; }}")
+    source = tmp_path / "only_float.c"
+    source.write_text("\n".join(lines) + "\n")
+    for name in ("gcc", "clang"):
+        if name == "clang" and shutil.which(name) is None:
+            continue
+        extra = ["-Wunsuffixed-float-constants"] if is_gnu(compiler(name)) else []
+        options = ["-std=c99", *WARNINGS, "-Wdouble-promotion", *extra, f"-I{RUNTIME}"]
+        command = [compiler(name), *options, "-c", str(source)]
+        result = subprocess.run([*command, "-o", str(tmp_path / "out.o")], capture_output=True, text=True)
+        assert result.returncode == 0, result.stderr
+
+
+def test_the_only_library_function_is_the_square_root():
+    for header in HEADERS.values():
+        text = without_comments(header)
+        foreign = {call for call in re.findall(r"\b([a-z]\w*)\(", text) if not call.startswith("gnc_")}
+        assert foreign <= {"defined", "void"}, foreign
+        named = set(re.findall(r"__builtin_\w+|\b(?:sqrtf?|memcpy)\b", text))
+        assert named <= {f"__builtin_{name}" for name in ("memcpy", "sqrt", "sqrtf", "fabs", "fabsf")} | {
+            "memcpy",
+            "sqrt",
+            "sqrtf",
+        }
+
+
+@pytest.mark.parametrize("p", PRECISIONS, **by_name)
+def test_arithmetic_that_is_not_ieee_is_refused(p: Precision, tmp_path: Path):
+    source = tmp_path / "fast.c"
+    source.write_text(f'#include "{HEADERS[p.name].name}"\n')
+    command = [
+        compiler("gcc"),
+        "-std=c99",
+        "-ffast-math",
+        f"-I{RUNTIME}",
+        "-c",
+        str(source),
+        "-o",
+        str(tmp_path / "out.o"),
+    ]
+    result = subprocess.run(command, capture_output=True, text=True)
+    assert result.returncode != 0
+    assert "IEEE" in result.stderr
