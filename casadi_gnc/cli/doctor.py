@@ -31,6 +31,8 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] 
     typer.echo("packages   " + ", ".join(f"{name} {version}" for name, version in report["packages"].items()))
     typer.echo("compilers  " + (", ".join(f"{c['command']} ({c['version']})" for c in report["compilers"]) or "none"))
     typer.echo("solvers    " + ", ".join(report["solvers"]))
+    typer.echo("targets    " + ", ".join(f"{name} ({'ready' if not lacks else 'lacks ' + ' and '.join(lacks)})"
+                                         for name, lacks in report["targets"].items()))  # fmt: skip
     typer.echo(f"cache      {report['cache']['folder']} ({report['cache']['libraries']} compiled libraries)")
     for missing in report["missing"]:
         typer.echo(f"missing    {missing['what']}: {missing['cost']}")
@@ -42,6 +44,7 @@ def examine() -> dict[str, Any]:
     """Return what the doctor finds, as plain data."""
     from casadi_gnc import compilers
     from casadi_gnc.allocation import backends
+    from casadi_gnc.embedded import targets
 
     packages, missing = {}, []
     for name in _CORE:
@@ -57,7 +60,7 @@ def examine() -> dict[str, Any]:
     found = compilers.available()
     if not found:
         missing.append(
-            {"what": "C compiler", "cost": "flights run on CasADi's virtual machine, some fifty times slower"}
+            {"what": "C compiler", "cost": "flights run on CasADi's virtual machine, some hundred times slower"}
         )
     folder = compilers.cache_folder()
     libraries = len(list(folder.glob("*.so")) + list(folder.glob("*.dll"))) if folder.is_dir() else 0
@@ -68,6 +71,7 @@ def examine() -> dict[str, Any]:
         "packages": packages,
         "compilers": [{"command": " ".join(c.command), "version": c.version} for c in found],
         "solvers": backends.available(),
+        "targets": {name: targets.find(name).missing() for name in targets.names()},
         "cache": {"folder": str(folder), "libraries": libraries},
         "missing": missing,
     }

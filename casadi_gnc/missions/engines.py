@@ -212,7 +212,7 @@ class _Sample:
 
 
 class VirtualMachineEngine:
-    """Fly on CasADi's virtual machine: no compiler needed, some fifty times slower."""
+    """Fly on CasADi's virtual machine: no compiler needed, some hundred times slower."""
 
     name = "vm"
 

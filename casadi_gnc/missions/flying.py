@@ -145,7 +145,7 @@ def _engine(
     try:
         return CompiledEngine(mission, scheme, built, maths), ()
     except NoCompilerError as error:
-        note = f"{error}. Flown on CasADi's virtual machine instead: some fifty times slower, with libm's last bits"
+        note = f"{error}. Flown on CasADi's virtual machine instead: some hundred times slower, with libm's last bits"
         return VirtualMachineEngine(mission, scheme, built), (note,)
 
 
