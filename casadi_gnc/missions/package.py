@@ -23,6 +23,9 @@ from casadi_gnc.missions import tapes
 from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.status import StepStatus
 
+#: Name of a tape -> its ports and its results.
+_Made = dict[str, tuple[dict[str, Any], dict[str, Any]]]
+
 
 def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str] = ()) -> Controller:
     """Return the sampled controller of a scheme.
@@ -70,10 +73,31 @@ def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str]
         least=tuple(float(value) for value in actuation.limit_below),
         most=tuple(float(value) for value in actuation.limit_above),
         tapes=_tapes(mission, chosen, symbols),
-        statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in StepStatus if bit is not StepStatus.DIVERGED},
+        statuses={
+            bit.value: (str(bit.name), bit.sentences[0]) for bit in StepStatus if bit in _raised(mission, chosen)
+        },
         tunables=tuple(parameters),
         allocation=allocator.problem if isinstance(allocator, OnlineInFlight) else None,
     )
+
+
+def _raised(mission: Mission, scheme: Scheme) -> set[StepStatus]:
+    """Return the bits that the controller can raise."""
+    s, actuation = tapes.Symbols(mission, scheme), scheme.actuation
+    bits = {
+        StepStatus.MEASUREMENT_REPLACED,
+        StepStatus.COMMAND_LIMITED,
+        StepStatus.COMMAND_REPLACED,
+        StepStatus.EFFORT_SHORT,
+        *scheme.law.status(s.t, tapes.law_inputs(mission, scheme, s.y), s.m),
+    }
+    if scheme.law.memory.size:
+        bits.add(StepStatus.MEMORY_RESET)
+    if actuation.judge is not None:
+        bits |= set(actuation.judge(mission.truth.measurement.split(s.y), s.limited, s.actuators))
+    if not actuation.is_symbolic:
+        bits |= {StepStatus.ALLOCATION_INEXACT, StepStatus.ALLOCATION_FAILED}
+    return bits
 
 
 def _parameter(scheme: Scheme, name: str) -> Tunable:
@@ -93,47 +117,62 @@ def _parameter(scheme: Scheme, name: str) -> Tunable:
 
 
 def _tapes(mission: Mission, scheme: Scheme, parameters: list[ca.SX]) -> dict[str, ca.Function]:
-    """Return the tapes of the controller; all derived parameters of all tapes are found together."""
+    """Return the tapes of the controller.
+
+    What allocate, judge and after need that does not depend on the new actuators is computed in
+    `before`, where it shares subexpressions with the law, and carried over in a column.
+    """
     s, law = tapes.Symbols(mission, scheme), scheme.law
-    seen = tapes.law_inputs(mission, scheme, s.y)
-    made = {
-        "start": ({"t": s.t, "y": s.y}, {"m": law.start(s.t, seen)}),
-        "before": (
-            {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "actuators": s.actuators},
-            tapes.before(mission, scheme, s),
-        ),
-        "judge": (
-            {"y": s.y, "limited": s.limited, "actuators": s.actuators},
-            {"verdict": tapes.judge(mission, scheme, s.y, s.limited, s.actuators)},
-        ),
-        "after": (
-            {"t": s.t, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited, "actuators": s.actuators},
-            {"memory": _advanced(mission, scheme, s, seen)},
-        ),
-    }
+    first = tapes.before(mission, scheme, s)
+    y, limited = first["accepted"], first["limited"]
+    told = mission.truth.inputs.symbol("told")
+    achieved = tapes.achieved(mission, scheme, y, limited, told)
+    seen = tapes.law_inputs(mission, scheme, y)
+    memory = advance(law, s.t, seen, first["memory"], first["wanted"], achieved)
+    late = {"judge": {"verdict": tapes.judge(mission, scheme, y, limited, told)}, "after": {"memory": memory}}
+    inputs = {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "actuators": s.actuators}
+    started = {"m": law.start(s.t, tapes.law_inputs(mission, scheme, s.y))}
+    now = {key: first[key] for key in ("accepted", "wanted", "limited", "lower", "upper", "flags")}
+    made: _Made = {"start": ({"t": s.t, "y": s.y}, started), "before": (inputs, now)}
     if scheme.actuation.is_symbolic:
-        made["allocate"] = (
-            {"y": s.y, "limited": s.limited, "actuators": s.actuators, "lower": s.lower, "upper": s.upper},
-            {"allocated": tapes.allocated(mission, scheme, s.y, s.limited, s.actuators, s.lower, s.upper)},
-        )
-    if not parameters:
-        return {name: tapes.function(name, ports, outputs) for name, (ports, outputs) in made.items()}
-    return _with_parameters(made, ca.vertcat(*parameters))
+        allocated = tapes.allocated(mission, scheme, y, s.limited, s.actuators, s.lower, s.upper)
+        ports = {"limited": s.limited, "actuators": s.actuators, "lower": s.lower, "upper": s.upper}
+        made["allocate"] = (ports, {"allocated": allocated})
+    made |= {name: ({"told": told}, outputs) for name, outputs in late.items()}
+    made, e, functions = _without_parameters(made, ca.vertcat(*parameters))
+    made = _carried(made, ca.vertcat(*inputs.values(), *([e["e"]] if e else [])))
+    for name, (ports, outputs) in made.items():
+        functions[name] = tapes.function(name, {**ports, **e}, outputs)
+    return functions
 
 
-def _advanced(mission: Mission, scheme: Scheme, s: Any, seen: Any) -> Any:
-    told = tapes.achieved(mission, scheme, s.y, s.limited, s.actuators)
-    return advance(scheme.law, s.t, seen, s.m, s.wanted, told)
+def _all_of(made: _Made) -> list[ca.SX]:
+    return [ca.densify(ca.SX(value)) for _, outputs in made.values() for value in outputs.values()]
 
 
-def _with_parameters(made: dict[str, tuple[dict, dict]], p: ca.SX) -> dict[str, ca.Function]:
-    """Return the tapes with a further port `e`, and `derive`, which computes it from the parameters."""
-    results = [ca.densify(ca.SX(value)) for _, outputs in made.values() for value in outputs.values()]
-    rest, symbols, derived = ca.extract_parametric(ca.cse(results), p, {"extract_trivial": True})
+def _replaced(made: _Made, results: list[ca.SX]) -> _Made:
+    rest = iter(results)
+    return {name: (ports, {key: next(rest) for key in outputs}) for name, (ports, outputs) in made.items()}
+
+
+def _without_parameters(made: _Made, p: ca.SX) -> tuple[_Made, dict[str, ca.SX], dict[str, ca.Function]]:
+    """Return the tapes in terms of `e`, that port, and `derive`, which computes it from the parameters."""
+    if not p.numel():
+        return made, {}, {}
+    results, symbols, derived = ca.extract_parametric(ca.cse(_all_of(made)), p, {"extract_trivial": True})
     if not derived:
         raise PackageError("the controller does not depend on the tunable parameters")
-    e, replaced = ca.vertcat(*symbols), iter(rest)
-    functions = {}
-    for name, (ports, outputs) in made.items():
-        functions[name] = tapes.function(name, {**ports, "e": e}, {key: next(replaced) for key in outputs})
-    return {"derive": tapes.function("derive", {"p": p}, {"derived": ca.vertcat(*derived)}), **functions}
+    derive = tapes.function("derive", {"p": p}, {"derived": ca.vertcat(*derived)})
+    return _replaced(made, results), {"e": ca.vertcat(*symbols)}, {"derive": derive}
+
+
+def _carried(made: _Made, known: ca.SX) -> _Made:
+    """Return the tapes with all that is known before the allocation moved into `before`."""
+    early = {name: made[name] for name in ("start", "before")}
+    late = {name: tape for name, tape in made.items() if name not in early}
+    results, symbols, values = ca.extract_parametric(ca.cse(_all_of(late)), known, {"extract_trivial": True})
+    late = _replaced(late, results)
+    column = ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
+    ports, outputs = early["before"]
+    early["before"] = (ports, {**outputs, "carried": ca.vertcat(*values) if values else ca.SX(0, 1)})
+    return early | {name: ({**own, "carried": column}, results) for name, (own, results) in late.items()}

@@ -68,6 +68,9 @@ def all_operations() -> ca.Function:
         ca.logic_not(a < b),
     ]
     results += [ca.if_else(a < b, c, d), 1e-300 * a, -1.25, 1 / 3 + a]
+    # Signed zeros: CasADi's choice between two is a sum, in which -0 becomes +0. Flags in arithmetic, numbers in logic.
+    results += [ca.if_else(a <= b, a, b), ca.if_else(a, b, a), 2 * (a < b) + (a <= c), ca.logic_and(a, b < c)]
+    results += [ca.logic_not(ca.logic_or(a, b)), ca.if_else(a < b, a, 0), ca.fabs(a < b) - (a != b)]
     return ca.Function("everything", [x], [ca.vertcat(*results)], ["x"], ["y"])
 
 
@@ -113,6 +116,16 @@ def test_constants_survive_the_round_trip(rng):
     assert c_constant(2.0) == "2."
     with pytest.raises(PrinterError, match="only finite numbers"):
         c_constant(np.inf)
+
+
+def test_bounds_beyond_a_float_still_tell_infinities():
+    """|x| <= 1e150 in double asks for a finite number; so must the float."""
+    x = ca.SX.sym("x")
+    text = print_function(ca.Function("f", [x], [ca.fabs(x) <= 1e150], ["x"], ["y"]), real="float")
+    assert "3.40282347e+38f" in text
+    for value in (1e150, 1e-150):
+        with pytest.raises(PrinterError, match="does not fit a float"):
+            print_function(ca.Function("f", [x], [x * value], ["x"], ["y"]), real="float")
 
 
 def test_float_text_has_no_double():

@@ -1,5 +1,6 @@
 """Packages that several tests share: each is generated once a session."""
 
+import atexit
 import functools
 import os
 import shutil
@@ -22,6 +23,7 @@ def made(
 ):
     """Return the folder of a package; tests that change it take a copy."""
     folder = Path(tempfile.mkdtemp(prefix="package-")) / "package"
+    atexit.register(shutil.rmtree, folder.parent, ignore_errors=True)
     generate(problem, folder, scheme=scheme, real=real, tunable=tunable, name=name or None, steps=steps)
     return folder
 

@@ -1,0 +1,76 @@
+"""`casadi-gnc verify`: a package against CasADi's machine, other compilers and targets, word by word."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def verify(
+    package: Annotated[Path, typer.Argument(help="Folder that `casadi-gnc generate` wrote.")],
+    target: Annotated[
+        str, typer.Option(help="host and names of targets, apart by commas; all: every target.")
+    ] = "host",
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
+    report: Annotated[Path | None, typer.Option(help="Write an HTML report.")] = None,
+) -> None:
+    """Compare a package's words here and on targets, and measure it there; exit code 1 where a word differs."""
+    from casadi_gnc.embedded import targets
+    from casadi_gnc.missions.packaging import verify as run
+
+    wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
+    if "all" in wanted:
+        wanted = ["host", *targets.names()]
+    found = run(package, wanted)
+    if report is not None:
+        _write(report, found)
+    if json:
+        import json as encoder
+
+        typer.echo(encoder.dumps(found, indent=2, allow_nan=False))
+    else:
+        _print(found)
+        if report is not None:
+            typer.echo(f"wrote {report}")
+    if found["words"]:
+        raise typer.Exit(1)
+
+
+def _write(path: Path, found: dict[str, Any]) -> None:
+    from casadi_gnc.embedded.report import render_report
+    from casadi_gnc.files import prepare_folder, write_beside
+
+    prepare_folder(path.parent)
+    write_beside(path, lambda place: place.write_text(render_report(found), encoding="utf-8"))
+
+
+def _print(found: dict[str, Any]) -> None:
+    typer.echo(f"{found['title']}, scheme {found['scheme']}, {found['real']}, {found['steps']} samples")
+    for one in found["comparisons"]:
+        verdict = f"{one['words']} of {one['of']} words differ"
+        typer.echo(f"  {one['what']}: {verdict}{'' if one['exact'] else ' (as they must between types)'}")
+        for signal in one["signals"]:
+            if signal["words"]:
+                typer.echo(
+                    f"    {signal['signal']}: {signal['words']} words, at most {signal['absolute']:.3g} "
+                    f"{signal['unit']}".rstrip()
+                    + f", {signal['relative']:.2g} of the largest, {signal['ulp']:.3g} ulp"
+                )
+    for row in found["targets"]:
+        typer.echo(
+            f"  {row['target']}: {row['instructions_median']} instructions a step (worst {row['instructions_worst']}), "
+            f"{row['text_bytes']} B code, {row['data_bytes'] + row['bss_bytes']} B static data, "
+            f"{row['stack_step_bytes']} B stack"
+        )
+    for name, tools in found["not_installed"].items():
+        typer.echo(f"  {name}: not installed here ({', '.join(tools)}); make targets installs it")
+    for warning in found["warnings"]:
+        typer.echo(f"  warning: {warning}")
+    for what, names in (
+        ("edited since it was generated", "edited"),
+        ("this version writes otherwise", "not_regenerated"),
+    ):
+        if found[names]:
+            typer.echo(f"  {what}: {', '.join(found[names])}")

@@ -1,0 +1,127 @@
+"""What a flight package is made of: a controller's tapes, its named signals and its parameters."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import casadi as ca
+
+from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.embedded.names import check_name
+from casadi_gnc.embedded.printer import Math, Real, c_constant
+from casadi_gnc.errors import PackageError
+from casadi_gnc.signals import Layout
+
+
+@dataclass(frozen=True)
+class Tunable:
+    """Describe a parameter that stays a variable of the C.
+
+    Parameters
+    ----------
+    name, unit, note : as declared by the law.
+    default : one number an element.
+    minimum, above : closed or open lower bound of every element, or None.
+    """
+
+    name: str
+    unit: str
+    note: str
+    default: tuple[float, ...]
+    minimum: float | None = None
+    above: float | None = None
+
+
+@dataclass(frozen=True)
+class Options:
+    """Say how a controller becomes C.
+
+    Parameters
+    ----------
+    name : prefix of every symbol and file.
+    real : type of every number.
+    maths : "gnc" (the same words on every target); "libm" serves comparisons with CasADi only.
+    """
+
+    name: str
+    real: Real = "double"
+    maths: Math = "gnc"
+
+    def __post_init__(self) -> None:
+        check_name(self.name)
+
+    def constant(self, value: float) -> str:
+        """Return a number as C of this type."""
+        return c_constant(value, self.real)
+
+
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """Hold a sampled controller, ready to be printed.
+
+    The tapes and their ports; `e` holds what was derived from the tunable parameters `p`, `carried`
+    what is known before the allocation and used after it:
+
+    ========  ===========================================================================
+    derive    p -> derived                                            (with tunables)
+    start     t, y, [e] -> m
+    before    t, y, good, m, actuators, [e] -> accepted, wanted, limited, lower, upper, flags, carried
+    allocate  limited, actuators, lower, upper, carried, [e] -> allocated   (where it is an expression)
+    judge     told, carried, [e] -> verdict
+    after     told, carried, [e] -> memory
+    ========  ===========================================================================
+
+    Parameters
+    ----------
+    title, source : of the problem.
+    scheme : the scheme's name.
+    period : sample period [s].
+    measured, memory, wanted, limited, actuators, report : layouts of the columns.
+    lower, upper : bounds of the actuators, one number an element.
+    least, most : bounds of the limited effort.
+    tapes : the functions above.
+    tunables : parameters that stay variables.
+    allocation : the problem that the on-board solver solves in each step, or None.
+    statuses : bit -> (name, sentence), those that a controller can raise.
+    """
+
+    title: str
+    source: str
+    scheme: str
+    period: float
+    measured: Layout
+    memory: Layout
+    wanted: Layout
+    limited: Layout
+    actuators: Layout
+    report: Layout
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    least: tuple[float, ...]
+    most: tuple[float, ...]
+    tapes: dict[str, ca.Function]
+    statuses: dict[int, tuple[str, str]]
+    tunables: tuple[Tunable, ...] = ()
+    allocation: AllocationProblem | None = None
+
+    def __post_init__(self) -> None:
+        for layout in (self.measured, self.memory, self.outputs):
+            for name in layout.names:
+                check_name(name, "signal")
+        for tunable in self.tunables:
+            check_name(tunable.name, "parameter")
+        if "time" in self.measured or "status" in self.outputs:
+            raise PackageError("time and status are taken: a signal needs another name")
+        for tape in self.tapes.values():
+            if any(not math.isfinite(tape.instruction_constant(k)) for k in _constants(tape)):
+                raise PackageError(f"the law of scheme {self.scheme} has a constant that is not finite")
+
+    @property
+    def outputs(self) -> Layout:
+        """What the step gives besides the status."""
+        return self.actuators + self.wanted + self.limited + self.report
+
+
+def _constants(tape: ca.Function) -> list[int]:
+    return [k for k in range(tape.n_instructions()) if tape.instruction_id(k) == ca.OP_CONST]

@@ -1,0 +1,159 @@
+"""Wrap a package as a functional mock-up unit: FMI 2.0 co-simulation, sources and a binary for this machine."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from casadi_gnc import assets, compilers
+from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.host import FLAGS
+from casadi_gnc.embedded.members import access
+from casadi_gnc.embedded.package import flight_files, put
+from casadi_gnc.embedded.source import access_tunable, environment
+from casadi_gnc.errors import CompilerError, PackageError
+from casadi_gnc.signals import Layout
+
+#: A date for every file of the archive: the same unit has the same bytes on another day.
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+def fmu_files(controller: Controller, options: Options, version: str, stop: float) -> dict[str, str]:
+    """Return `modelDescription.xml` and the sources: path in the archive -> text."""
+    package = flight_files(controller, options)
+    sources = {path: text for path, text in package.items() if path.endswith((".c", ".h"))}
+    guid = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32]
+    parameters = [place for one in controller.tunables for place in access_tunable(one, "")]
+    wrapper = environment().get_template("fmu.c.j2").render(
+        name=options.name,
+        title=controller.title.replace("*/", "* /"),
+        guid=guid,
+        period=f"{controller.period:g}",
+        period_double=Options(options.name).constant(controller.period),
+        inputs=access(controller.measured, "input."),
+        outputs=access(controller.outputs, "output."),
+        parameters=parameters,
+    )  # fmt: skip
+    xml = _xml().render(
+        name=options.name,
+        title=controller.title,
+        description=f"scheme {controller.scheme}{', ' + controller.source if controller.source else ''}",
+        guid=guid,
+        version=version,
+        period=repr(controller.period),
+        stop=repr(stop),
+        sources=["fmu.c", *(path for path in sources if path.endswith(".c"))],
+        variables=_variables(controller),
+        units=sorted({one["unit"] for one in _variables(controller) if one["unit"]}),
+    )
+    files = {f"sources/{path}": text for path, text in {"fmu.c": wrapper, **sources}.items()}
+    return {"modelDescription.xml": xml, **files, "documentation/LICENSE": package["LICENSE"]}
+
+
+def _xml() -> jinja2.Template:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
+        undefined=jinja2.StrictUndefined,
+        autoescape=True,
+    ).get_template("fmu.xml.j2")
+
+
+def _variables(controller: Controller) -> list[dict[str, Any]]:
+    """Return the scalar variables in the order of their value references."""
+    rows = _elements(controller.measured, "input", "discrete", "measured")
+    bounds = [*zip(controller.lower, controller.upper, strict=True)]
+    outputs = _elements(controller.outputs, "output", "discrete", "held from sample to sample; 0 before the first")
+    for row, (low, high) in zip(outputs, bounds, strict=False):  # the actuators come first
+        row |= {"low": min(repr(low), repr(0.0), key=float), "high": max(repr(high), repr(0.0), key=float)}
+    rows += outputs
+    rows.append(_variable("status", "output", "discrete", "bits of the status; 0: nothing unusual", "", "Integer", "0"))
+    for one in controller.tunables:
+        layout_names = (
+            [one.name] if len(one.default) == 1 else [f"{one.name}[{i + 1}]" for i in range(len(one.default))]
+        )
+        for name, value in zip(layout_names, one.default, strict=True):
+            rows.append(_variable(name, "parameter", "tunable", one.note, one.unit, "Real", repr(value)))
+    for i, row in enumerate(rows, 1):
+        row["index"] = i
+    return rows
+
+
+def _elements(layout: Layout, causality: str, variability: str, note: str) -> list[dict[str, Any]]:
+    rows = []
+    for signal in layout.signals:
+        names = [signal.name] if signal.size == 1 else [f"{signal.name}[{i + 1}]" for i in range(signal.size)]
+        about = f"{note}, {signal.frame} frame" if signal.frame else note
+        rows += [_variable(name, causality, variability, about, signal.unit, "Real", "0") for name in names]
+    return rows
+
+
+def _variable(
+    name: str, causality: str, variability: str, note: str, unit: str, kind: str, start: str
+) -> dict[str, Any]:
+    return {
+        "name": name,
+        "causality": causality,
+        "variability": variability,
+        "initial": "exact" if causality != "input" else "",
+        "description": note,
+        "unit": "" if unit == "-" else unit,
+        "type": kind,
+        "start": start,
+        "low": None,
+        "high": None,
+    }
+
+
+def platform_folder() -> str:
+    """Return the folder that FMI 2.0 names for binaries of this machine; raise `PackageError` if it names none."""
+    system = {"linux": "linux", "darwin": "darwin", "win32": "win"}.get(sys.platform)
+    if (
+        system is None
+        or sys.maxsize <= 2**32
+        or platform.machine().lower() not in ("x86_64", "amd64", "arm64", "aarch64")
+    ):
+        raise PackageError(f"FMI 2.0 names no folder for binaries of {platform.platform()}")
+    return f"{system}64"
+
+
+def build(files: dict[str, str], options: Options, workshop: Path, target: Path) -> None:
+    """Compile the sources and write the archive.
+
+    Raises
+    ------
+    NoCompilerError, CompilerError
+        Where there is no compiler, or it refuses the sources.
+    """
+    put(workshop, files)
+    compiler, folder = compilers.find(), platform_folder()
+    library = workshop / "binaries" / folder / f"{options.name}{'.dll' if folder == 'win64' else '.so'}"
+    library.parent.mkdir(parents=True)
+    sources = [str(path) for path in sorted((workshop / "sources").glob("*.c"))]
+    hidden = ["-fPIC", "-shared", "-fvisibility=hidden"]
+    command = [
+        *compiler.command,
+        *FLAGS,
+        "-O2",
+        *hidden,
+        f"-I{workshop / 'sources'}",
+        "-o",
+        str(library),
+        *sources,
+        "-lm",
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    if done.returncode:
+        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+        raise CompilerError(f"{compiler.name} refused the unit: {complaint.strip()}")
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for path in sorted(path for path in workshop.rglob("*") if path.is_file()):
+            entry = zipfile.ZipInfo(path.relative_to(workshop).as_posix(), _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(entry, path.read_bytes())

@@ -1,0 +1,89 @@
+"""Build a package on this machine and run it: the words that every target must repeat."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from casadi_gnc import assets, compilers
+from casadi_gnc.embedded.targets import units
+from casadi_gnc.errors import CompilerError
+
+#: -fno-math-errno: the square root is one instruction; the words stay the same.
+FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")
+
+
+class HostPackage:
+    """Run a package that was compiled for this machine.
+
+    Parameters
+    ----------
+    folder : of the package.
+    name : its prefix.
+    compiler : `compilers.find()` by default.
+    flags : of the optimiser, and more.
+
+    Raises
+    ------
+    NoCompilerError, CompilerError
+        Where there is no compiler, or it refuses the package.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        *,
+        compiler: compilers.Compiler | None = None,
+        flags: tuple[str, ...] = ("-O2",),
+    ) -> None:
+        self.compiler = compiler or compilers.find()
+        binding = assets.folder("codegen") / "targets" / "binding.c"
+        sources = [binding, *units(folder, name)]
+        with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
+            library = Path(workshop) / "package.so"
+            command = [
+                *self.compiler.command,
+                *FLAGS,
+                *flags,
+                "-fPIC",
+                "-shared",
+                f"-I{folder}",
+                f"-I{folder / 'test'}",
+            ]
+            done = subprocess.run(
+                [*command, "-o", str(library), *map(str, sources), "-lm"], capture_output=True, text=True, timeout=600
+            )
+            if done.returncode:
+                complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+                raise CompilerError(f"{self.compiler.name} refused the package: {complaint.strip()}")
+            self._c = ctypes.CDLL(str(library))  # stays loaded when the file goes
+        self._c.binding_size.restype = ctypes.c_long
+        self.state_size, self.params_size, word = (int(self._c.binding_size(i)) for i in range(3))
+        self.word = np.dtype(np.uint64 if word == 8 else np.uint32)
+        self._params = np.zeros(-(-self.params_size // 8))
+        self._state = np.zeros(-(-self.state_size // 8))
+        if self._c.binding_init(_pointer(self._params)):
+            raise CompilerError("the package's init refused its own defaults")
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, as before the first sample."""
+        self._c.binding_reset(_pointer(self._state))
+
+    def replay(self, inputs: np.ndarray, outputs: int) -> np.ndarray:
+        """Run samples (K, inputs) of words from the present state; return (K, outputs) words."""
+        given = np.ascontiguousarray(inputs, dtype=self.word)
+        found = np.zeros((len(given), outputs), self.word)
+        self._c.binding_replay(
+            _pointer(self._state), _pointer(self._params), ctypes.c_long(len(given)), _pointer(given), _pointer(found)
+        )
+        return found
+
+
+def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)

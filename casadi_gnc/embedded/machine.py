@@ -1,0 +1,59 @@
+"""Run a controller's tapes on CasADi's virtual machine, in the order of the generated step."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.allocation import OnlineInFlight
+from casadi_gnc.embedded.controller import Controller
+from casadi_gnc.status import StepStatus
+
+
+class Machine:
+    """Step a controller in double precision; the reference that compiled code is compared with."""
+
+    def __init__(self, controller: Controller) -> None:
+        self._c = controller
+        self._derived = ca.DM(0, 1)
+        if controller.tunables:
+            self._derived = self._run("derive", p=[v for one in controller.tunables for v in one.default])["derived"]
+        self._solve = OnlineInFlight(controller.allocation).start() if controller.allocation is not None else None
+        self._memory = np.zeros(controller.memory.size)
+        self._good = np.zeros(controller.measured.size)
+        self._told = np.zeros(controller.actuators.size)
+        self._started = False
+
+    def _run(self, name: str, **ports: Any) -> dict[str, np.ndarray]:
+        tape = self._c.tapes[name]
+        inputs = [ports[port] if port != "e" else self._derived for port in tape.name_in()]
+        results = tape.call([ca.DM(value) for value in inputs])
+        return {port: np.array(value).ravel() for port, value in zip(tape.name_out(), results, strict=True)}
+
+    def step(self, row: np.ndarray) -> np.ndarray:
+        """Return outputs and status of a sample; `row` is the time and the measurement."""
+        t, y = row[0], row[1:]
+        if not self._started:
+            self._good = y
+            self._memory = self._run("start", t=t, y=y)["m"] if self._c.memory.size else self._memory
+        now = self._run("before", t=t, y=y, good=self._good, m=self._memory, actuators=self._told)
+        status = int(now["flags"][0])
+        self._started = self._started or not status & StepStatus.MEASUREMENT_REPLACED
+        box = {"lower": now["lower"], "upper": now["upper"]}
+        report = np.zeros(0)
+        if self._solve is not None:
+            told, noted, report = self._solve(now["limited"], self._told.copy(), *box.values())
+            status |= int(noted)
+        else:
+            ports = {"limited": now["limited"], "actuators": self._told, "carried": now["carried"]}
+            told = self._run("allocate", **ports, **box)["allocated"]
+        status |= int(self._run("judge", told=told, carried=now["carried"])["verdict"][0])
+        self._memory = self._run("after", told=told, carried=now["carried"])["memory"]
+        self._good, self._told = now["accepted"], np.array(told)
+        return np.concatenate([told, now["wanted"], now["limited"], report, [status]])
+
+    def replay(self, rows: np.ndarray) -> np.ndarray:
+        """Return outputs and status of samples (K, 1 + measured), from the first one on."""
+        return np.array([self.step(row) for row in rows])

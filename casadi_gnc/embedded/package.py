@@ -1,0 +1,178 @@
+"""Make a package of a controller: a folder that an embedded project takes as it is.
+
+A folder that was made before is replaced only if nobody changed a file of it since: `manifest.json`
+holds the hash of each. Everything is written beside the folder and renamed, so nothing is half done.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc import assets
+from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.members import access
+from casadi_gnc.embedded.source import allocator_files, environment, render_header, render_source, runtime_files
+from casadi_gnc.errors import OutputError, PackageError
+
+#: Where a package's own Makefile and CMake build; never looked at.
+BUILD = "build"
+MANIFEST = "manifest.json"
+
+
+def flight_files(controller: Controller, options: Options) -> dict[str, str]:
+    """Return the files that fly: path inside the package -> text."""
+    name = options.name
+    files = {f"{name}.h": render_header(controller, options), f"{name}.c": render_source(controller, options)}
+    files |= allocator_files(controller, options)
+    runtime = assets.folder("codegen") / "runtime"
+    files |= {file: (runtime / file).read_text(encoding="utf-8") for file in runtime_files(controller, options)}
+    files["LICENSE"] = (assets.folder("codegen") / "LICENSE").read_text(encoding="utf-8")
+    return files
+
+
+def replay_header(controller: Controller, options: Options, steps: int) -> str:
+    """Return `test/replay.h`, which names the words of inputs and outputs."""
+    return environment().get_template("package_replay.h.j2").render(
+        name=options.name,
+        bits=64 if options.real == "double" else 32,
+        steps=steps,
+        inputs=["input->time", *access(controller.measured, "input->")],
+        outputs=access(controller.outputs, "output->"),
+    )  # fmt: skip
+
+
+def replay_files(
+    controller: Controller, options: Options, inputs: np.ndarray, outputs: np.ndarray, spoiled: int
+) -> dict[str, str]:
+    """Return the replay program, its vectors (rows of words) and the files that build it."""
+    render = environment().get_template
+    units = [f"{options.name}.c", *allocator_files(controller, options)]
+    about = {"name": options.name, "units": units}
+    vectors = {"inputs": _rows(inputs), "outputs": _rows(outputs), "steps": len(inputs), "spoiled": spoiled}
+    return {
+        "test/replay.h": replay_header(controller, options, len(inputs)),
+        "test/replay.c": render("package_replay.c.j2").render(**about),
+        "test/vectors.c": render("package_vectors.c.j2").render(**about, **vectors),
+        "Makefile": render("package_makefile.j2").render(**about),
+        "CMakeLists.txt": render("package_cmake.j2").render(**about),
+    }
+
+
+def _rows(words: np.ndarray) -> list[str]:
+    ending = "u" if words.dtype == np.uint32 else "ull"
+    return [", ".join(f"0x{int(word):x}{ending}" for word in row) for row in words]
+
+
+def manifest(files: dict[str, str], about: dict[str, Any]) -> str:
+    """Return the text of the manifest: what the package was made of, and the hash of each file. No date."""
+    hashes = {path: digest(text) for path, text in sorted(files.items())}
+    return json.dumps({"format": 1, **about, "files": hashes}, indent=2) + "\n"
+
+
+def digest(text: str) -> str:
+    """Return the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a package folder; raise `PackageError` if it is none."""
+    path = folder / MANIFEST
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise PackageError(f"{folder} is no package: its {MANIFEST} cannot be read ({error})") from error
+    if not isinstance(found, dict) or found.get("format") != 1 or not isinstance(found.get("files"), dict):
+        raise PackageError(f"{folder} is no package of this version: its {MANIFEST} has another form")
+    return found
+
+
+def edited(folder: Path) -> list[str]:
+    """Return the files of a package that were changed, added or taken away since it was made."""
+    known = read_manifest(folder)["files"]
+    strange = []
+    for path in sorted(folder.rglob("*")):
+        inside = path.relative_to(folder).as_posix()
+        if path.is_dir() or inside == MANIFEST or inside.split("/")[0] == BUILD:
+            continue
+        if inside not in known:
+            strange.append(f"{inside} (added)")
+        elif hashlib.sha256(path.read_bytes()).hexdigest() != known[inside]:
+            strange.append(f"{inside} (changed)")
+    strange += [f"{inside} (missing)" for inside in known if not (folder / inside).is_file()]
+    return strange
+
+
+def check_room(folder: Path, force: bool = False) -> None:
+    """Raise `OutputError` if a package may not be written there; called before any work is done."""
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise OutputError(f"{folder} is a file; choose another --out")
+    if not any(folder.iterdir()):
+        return
+    if not (folder / MANIFEST).is_file():
+        raise OutputError(f"{folder} is not empty and is no package; choose a new folder with --out")
+    changes = edited(folder)
+    if changes and not force:
+        more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
+        raise OutputError(
+            f"{folder} was edited since it was generated: {', '.join(changes[:3])}{more}; "
+            "move your changes away, or use --force to overwrite (files of your own are kept)"
+        )
+
+
+def write(folder: Path, build: Callable[[Path], dict[str, str]], *, force: bool = False) -> None:
+    """Write a package.
+
+    Parameters
+    ----------
+    folder : replaced as a whole; files of the user's own stay in it.
+    build : called on an empty workshop beside `folder`; returns path -> text of all files.
+    force : overwrite files that were edited.
+
+    Raises
+    ------
+    OutputError
+        Where the folder is something else, was edited, or cannot be written; it is left as it was.
+    """
+    check_room(folder, force)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as place:
+            workshop, fresh = Path(place) / "work", Path(place) / "new"
+            workshop.mkdir()
+            files = build(workshop)
+            put(fresh, files)
+            if folder.exists():
+                _keep_own(folder, fresh, set(read_manifest(folder)["files"]) if any(folder.iterdir()) else set())
+                os.replace(folder, Path(place) / "old")
+            os.replace(fresh, folder)
+    except OSError as error:
+        raise OutputError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from error
+
+
+def put(folder: Path, files: dict[str, str]) -> None:
+    """Write texts under a folder."""
+    for path, text in files.items():
+        target = folder / path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _keep_own(folder: Path, fresh: Path, known: set[str]) -> None:
+    """Copy the user's own files of an old package into the new one."""
+    for path in sorted(folder.rglob("*")):
+        inside = path.relative_to(folder)
+        own = inside.as_posix() not in known and inside.as_posix() != MANIFEST and inside.parts[0] != BUILD
+        if path.is_file() and own and not (fresh / inside).exists():
+            (fresh / inside).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, fresh / inside)

@@ -1,0 +1,263 @@
+"""Print a controller as C: header, source, and the allocator where the step needs it."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import jinja2
+
+from casadi_gnc import assets
+from casadi_gnc.allocation import online
+from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.members import (
+    access,
+    elements,
+    members,
+    output_members,
+    tunable_members,
+)
+from casadi_gnc.embedded.printer import print_function
+
+#: Objects that a tape may read or write, with their C declarations ({name}: prefix of the package).
+_OBJECTS = {
+    "state": "const {name}_state *state",
+    "params": "const {name}_params *params",
+    "input": "const {name}_input *input",
+    "now": "sample *now",
+}
+_CALLED = {"state": "state", "params": "params", "input": "input", "now": "&now"}
+_SIZED = "/* The allocator of this package: sizes and names; what follows is the same for all. */\n"
+_NOTES = {
+    "derive": "What follows from the parameters.",
+    "start": "The memory at the first measurement.",
+    "before": "From the measurement to the limited effort and the bounds of the actuators.",
+    "allocate": "From the limited effort to the actuators.",
+    "judge": "What is known once the actuators are.",
+    "after": "The memory one sample later.",
+}
+
+
+def environment() -> jinja2.Environment:
+    """Return the templates of `codegen/`."""
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def runtime_files(controller: Controller, options: Options) -> list[str]:
+    """Return the files of `codegen/runtime` that the package carries."""
+    maths = (
+        [] if options.maths == "libm" else ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
+    )
+    if controller.allocation is None:
+        return maths
+    return [*maths, "gnc_allocate.h", "gnc_allocate_internal.h"]
+
+
+def render_header(controller: Controller, options: Options) -> str:
+    """Return the text of the header."""
+    sizes = {
+        "MEASURED": controller.measured.size,
+        "MEMORY": controller.memory.size,
+        "EFFORTS": controller.limited.size,
+        "ACTUATORS": controller.actuators.size,
+    }
+    state = {"memory": members(controller.memory), "good": members(controller.measured)}
+    state["previous"] = members(controller.actuators)
+    return environment().get_template("package_header.h.j2").render(
+        **_common(controller, options),
+        period=options.constant(controller.period),
+        sizes=[{"name": name, "value": value} for name, value in sizes.items()],
+        statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.statuses.items()],
+        measured=members(controller.measured),
+        outputs=output_members(controller),
+        state=state,
+        tunables=tunable_members(controller),
+        derived=_derived(controller),
+        allocation=_sizes(controller),
+    )  # fmt: skip
+
+
+def render_source(controller: Controller, options: Options) -> str:
+    """Return the text of the source file.
+
+    Raises
+    ------
+    PrinterError
+        For an operation or a constant that has no C form.
+    """
+    tapes, calls = [], {}
+    for name in _NOTES:
+        if name not in controller.tapes or (name in ("start", "after") and not controller.memory.size):
+            continue
+        text, call = _print(name, controller, options)
+        tapes.append({"text": text, "note": _NOTES[name]})
+        calls[name] = call
+    reads = controller.allocation is not None or any("params" in call for call in calls.values())
+    return environment().get_template("package_source.c.j2").render(
+        **_common(controller, options),
+        maths=options.maths,
+        count={
+            "measured": controller.measured.size,
+            "memory": controller.memory.size,
+            "carried": _carried(controller),
+            "efforts": controller.limited.size,
+            "actuators": controller.actuators.size,
+        },
+        tapes=tapes,
+        calls=calls,
+        reads_params=reads,
+        tunables=controller.tunables,
+        checks=_checks(controller, options),
+        defaults=_defaults(controller, options),
+        first=_copy(access(controller.measured, "state->good."), access(controller.measured, "input->")),
+        copies=_copies(controller),
+        allocation=_problem(controller.allocation, options) if controller.allocation is not None else None,
+    )  # fmt: skip
+
+
+def allocator_files(controller: Controller, options: Options) -> dict[str, str]:
+    """Return the units of the allocator under the package's own names, so that two of them link into one image."""
+    if controller.allocation is None:
+        return {}
+    sizes = environment().get_template("package_sizes.j2").render(
+        **_common(controller, options), allocation=_sizes(controller)
+    )  # fmt: skip
+    runtime, files = assets.folder("codegen") / "runtime", {}
+    for unit in online.units():
+        text = (runtime / unit).read_text(encoding="utf-8")
+        files[unit.replace("gnc", options.name, 1)] = f"{_SIZED}{sizes}\n{text}"
+    return files
+
+
+def _common(controller: Controller, options: Options) -> dict[str, Any]:
+    title = controller.title.replace("*/", "* /").replace("\n", " ")
+    return {
+        "name": options.name,
+        "NAME": options.name.upper(),
+        "title": title,
+        "scheme": controller.scheme,
+        "real": options.real,
+    }
+
+
+def _sizes(controller: Controller) -> dict[str, int] | None:
+    if controller.allocation is None:
+        return None
+    return dict(zip(("N", "R", "P", "V"), online.sizes(controller.allocation), strict=True))
+
+
+def _derived(controller: Controller) -> int:
+    return controller.tapes["derive"].numel_out(0) if "derive" in controller.tapes else 0
+
+
+def _carried(controller: Controller) -> int:
+    return controller.tapes["before"].numel_out("carried")
+
+
+def _places(name: str, controller: Controller) -> dict[str, list[str]]:
+    """Return where the elements of each port of a tape lie."""
+    y, n = controller.measured, controller.limited.size
+    count, memory = controller.actuators.size, controller.memory.size
+    return {
+        "t": ["input->time"],
+        "y": access(y, "input->"),
+        "good": access(y, "state->good."),
+        "m": access(controller.memory, "state->memory."),
+        "actuators": elements("now->previous", count)
+        if name == "allocate"
+        else access(controller.actuators, "state->previous."),
+        "told": elements("now->actuators", count),
+        "carried": elements("now->carried", _carried(controller)),
+        "p": [place for one in controller.tunables for place in access_tunable(one, "params->")],
+        "e": elements("params->derived", _derived(controller)),
+        "derived": elements("params->derived", _derived(controller)),
+        "accepted": elements("now->accepted", y.size),
+        "memory": elements("now->memory", memory),
+        "wanted": elements("now->wanted", n),
+        "limited": elements("now->limited", n),
+        "lower": elements("now->lower", count),
+        "upper": elements("now->upper", count),
+        "allocated": elements("now->actuators", count),
+        "flags": ["now->flags"],
+        "verdict": ["now->verdict"],
+    }
+
+
+def access_tunable(tunable: Any, owner: str) -> list[str]:
+    """Return the C expression of each element of a parameter."""
+    count = len(tunable.default)
+    return [f"{owner}{tunable.name}"] if count == 1 else elements(f"{owner}{tunable.name}", count)
+
+
+def _print(name: str, controller: Controller, options: Options) -> tuple[str, str]:
+    """Return the C of a tape and the arguments of its call; it takes those objects that it touches."""
+    tape = controller.tapes[name]
+    places = _places(name, controller)
+    arguments: dict[str, Any] = {"maths": options.maths, "real": options.real, "places": places, "flag": "gnc_flag"}
+    draft = print_function(tape, arguments=[], **arguments)
+    touched = [thing for thing in _OBJECTS if re.search(rf"\b{thing}->", draft)]
+    declared = [_OBJECTS[thing].format(name=options.name) for thing in touched]
+    if name in ("start", "derive"):  # the only ones that write to what the caller owns
+        declared = [text.removeprefix("const ") if thing in ("state", "params") else text
+                    for thing, text in zip(touched, declared, strict=True)]  # fmt: skip
+    if name == "start":
+        declared = [text if "params" not in text else f"const {text}" for text in declared]
+    return print_function(tape, arguments=declared, **arguments), ", ".join(_CALLED[thing] for thing in touched)
+
+
+def _copy(targets: list[str], sources: list[str]) -> list[str]:
+    return [f"{target} = {source};" for target, source in zip(targets, sources, strict=True)]
+
+
+def _copies(controller: Controller) -> dict[str, list[str]]:
+    """Return the statements that move columns between the caller's structs and the sample."""
+    count, efforts = controller.actuators.size, controller.limited.size
+    told = elements("now.actuators", count)
+    results = _copy(access(controller.measured, "state->good."), elements("now.accepted", controller.measured.size))
+    results += _copy(access(controller.memory, "state->memory."), elements("now.memory", controller.memory.size))
+    results += _copy(access(controller.actuators, "state->previous."), told)
+    results += _copy(access(controller.actuators, "output->"), told)
+    results += _copy(access(controller.wanted, "output->"), elements("now.wanted", efforts))
+    results += _copy(access(controller.limited, "output->"), elements("now.limited", efforts))
+    previous = _copy(elements("now.previous", count), access(controller.actuators, "state->previous."))
+    return {"results": results, "previous": previous}
+
+
+def _checks(controller: Controller, options: Options) -> list[str]:
+    """Return a C condition for each element of each parameter; false for NaN."""
+    largest = options.constant(1e30)
+    conditions = []
+    for one in controller.tunables:
+        for place in access_tunable(one, "params->"):
+            low = f"{place} > {options.constant(one.above)}" if one.above is not None else (
+                f"{place} >= {options.constant(one.minimum if one.minimum is not None else -1e30)}"
+            )  # fmt: skip
+            conditions += [f"({low})", f"({place} <= {largest})"]
+    return conditions
+
+
+def _defaults(controller: Controller, options: Options) -> list[str]:
+    return [
+        f"{place} = {options.constant(value)};"
+        for one in controller.tunables
+        for place, value in zip(access_tunable(one, "params->"), one.default, strict=True)
+    ]
+
+
+def _problem(problem: AllocationProblem, options: Options) -> dict[str, Any]:
+    """Return the constant tables of the allocation problem, row by row."""
+    arrays = {"A0": problem.effectiveness}
+    if online.sizes(problem)[2]:
+        arrays |= {"E": problem.coupling, "D": problem.errors}
+    arrays |= {"m1": problem.effort_weight, "m2": problem.change_weight, "preferred": problem.preferred}
+    tables = [
+        {"name": name, "values": [options.constant(float(value)) for value in array.ravel()]}
+        for name, array in arrays.items()
+    ]
+    return {"tables": tables, "h": options.constant(float(problem.accuracy_weight))}

@@ -1,0 +1,251 @@
+"""The boards of `codegen/targets`: build a package for one, run it in its emulator, read what it wrote.
+
+A target is one TOML file there. The emulator advances its clock with each instruction, so counts are
+exact and the same on every host.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tempfile
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc import assets
+from casadi_gnc.embedded import stack
+from casadi_gnc.errors import TargetError
+
+#: Flags of every target; the same as on the host, with sections that the linker may drop.
+FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-ffunction-sections", "-fdata-sections")
+#: The program's own files may use what registers and start-up need.
+_BOARD_FLAGS = ("-std=gnu99", "-O2", "-ffunction-sections")
+#: Seconds after which an emulator is stopped.
+PATIENCE = 600.0
+#: Symbols of arithmetic on doubles in software, and functions of the C library on doubles.
+_DOUBLE = re.compile(
+    r"^(__aeabi_(d|[a-z0-9]+2d|cd)\w*|__\w*df\w*|__\w*(extendsfdf2|truncdfsf2)|"
+    r"(sin|cos|tan|exp|log|pow|sqrt|fabs|floor|ceil|tanh|atan2?|asin|acos|expm1|log1p|fmod))$"
+)
+#: Numbers at the head of what a program writes, in the order of `enum number` in measure.c.
+_NUMBERS = 8
+
+
+@dataclass(frozen=True)
+class Target:
+    """Describe a board: what to compile with, what to run in; fields as in its file."""
+
+    name: str
+    title: str
+    compiler: str
+    flags: tuple[str, ...]
+    link: tuple[str, ...]
+    script: str
+    sources: tuple[str, ...]
+    emulator: tuple[str, ...]
+    hardware: tuple[str, ...]
+    packages: tuple[str, ...]
+
+    def missing(self) -> list[str]:
+        """Return the commands that are not installed."""
+        return [tool for tool in (self.compiler, self.emulator[0]) if shutil.which(tool) is None]
+
+    def need(self) -> None:
+        """Raise `TargetError` naming what is missing and how to get it."""
+        if self.missing():
+            raise TargetError(
+                f"target {self.name} needs {' and '.join(self.missing())}, which is not installed; "
+                f"`make targets` installs it (Debian packages {', '.join(self.packages)}), "
+                "and --target host works without"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Hold what a run on a target gave.
+
+    Parameters
+    ----------
+    outputs : (K, outputs) words.
+    instructions : (K,), of each step, the call's own cost taken off.
+    init_instructions : of init.
+    step_stack, init_stack : bytes, by paint.
+    step_bound : the deepest stack of a step that any input can ask for, from the compiler's call graph.
+    state_size, params_size : bytes.
+    text, data, bss : bytes of the package's own object files.
+    compiler : version line.
+    """
+
+    outputs: np.ndarray
+    instructions: np.ndarray
+    init_instructions: int
+    step_stack: int
+    init_stack: int
+    step_bound: stack.Stack
+    state_size: int
+    params_size: int
+    text: int
+    data: int
+    bss: int
+    compiler: str
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers as plain data."""
+        return {
+            "steps": len(self.instructions),
+            "instructions_median": int(np.median(self.instructions)),
+            "instructions_worst": int(self.instructions.max()),
+            "instructions_first": int(self.instructions[0]),
+            "instructions_init": self.init_instructions,
+            "stack_step_bytes": self.step_stack,
+            "stack_init_bytes": self.init_stack,
+            "stack_step_bound_bytes": self.step_bound.bytes,
+            "stack_deepest_calls": list(self.step_bound.way),
+            "stack_not_counted": list(self.step_bound.unknown),
+            "state_bytes": self.state_size,
+            "params_bytes": self.params_size,
+            "text_bytes": self.text,
+            "data_bytes": self.data,
+            "bss_bytes": self.bss,
+            "compiler": self.compiler,
+        }
+
+
+def names() -> list[str]:
+    """Return the names of the targets there are."""
+    return sorted(path.stem for path in (assets.folder("codegen") / "targets").glob("*.toml"))
+
+
+def find(name: str) -> Target:
+    """Return a target by name; raise `TargetError` naming those there are."""
+    path = assets.folder("codegen") / "targets" / f"{name}.toml"
+    if name not in names():
+        raise TargetError(f"no target {name!r}; there is host, {', '.join(names())}")
+    fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    whole: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
+    return Target(name, **whole)
+
+
+def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", float_only: bool = False) -> Measured:
+    """Build a package for a target and replay its vectors there.
+
+    Parameters
+    ----------
+    folder, name : of the package and its prefix.
+    target : what for.
+    optimise : flag of the optimiser.
+    float_only : refuse objects that compute with doubles.
+
+    Raises
+    ------
+    TargetError
+        Where a tool is missing, the compiler refuses, a symbol of double arithmetic is found in a
+        package of floats, or the program does not end well.
+    """
+    target.need()
+    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
+        shop = Path(workshop)
+        objects = [
+            _compile(source, shop, folder, target, (*FLAGS, optimise, "-fcallgraph-info=su"))
+            for source in units(folder, name)
+        ]
+        if float_only:
+            _refuse_doubles(objects, target)
+        board = assets.folder("codegen") / "targets"
+        extra = [folder / "test" / "vectors.c", board / "measure.c", *(board / source for source in target.sources)]
+        rest = [_compile(source, shop, folder, target, _BOARD_FLAGS) for source in extra]
+        image = shop / "image.elf"
+        link = [target.compiler, *target.flags, *target.link, f"-T{board / target.script}", "-Wl,--gc-sections"]
+        _run([*link, *map(str, objects + rest), "-lm", "-o", str(image)], target)
+        words = _emulate(image, target, shop)
+        text, data, bss = _size(objects, target)
+        bound = stack.deepest([path.with_suffix(".ci") for path in objects], f"{name}_step")
+    return _read(words, text, data, bss, bound, _run([target.compiler, "--version"], target).splitlines()[0])
+
+
+def units(folder: Path, name: str) -> list[Path]:
+    """Return the C files of a package that fly."""
+    return [folder / f"{name}.c", *sorted(folder.glob(f"{name}_allocate*.c"))]
+
+
+def doubles_in(objects: list[Path], target: Target) -> list[str]:
+    """Return the symbols of double arithmetic that object files ask for."""
+    found = []
+    for line in _run([_tool(target, "nm"), "-u", *map(str, objects)], target).splitlines():
+        symbol = line.split()[-1] if line.split() else ""
+        if _DOUBLE.match(symbol):
+            found.append(symbol)
+    return found
+
+
+def _refuse_doubles(objects: list[Path], target: Target) -> None:
+    found = doubles_in(objects, target)
+    if found:
+        raise TargetError(
+            f"a package of floats calls double arithmetic on {target.name}: {', '.join(sorted(set(found)))}"
+        )
+
+
+def _tool(target: Target, tool: str) -> str:
+    return f"{target.compiler.removesuffix('gcc')}{tool}"
+
+
+def _compile(source: Path, shop: Path, folder: Path, target: Target, flags: tuple[str, ...]) -> Path:
+    product = shop / f"{source.stem}.o"
+    include = [f"-I{path}" for path in (folder, folder / "test", assets.folder("codegen") / "targets")]
+    _run([target.compiler, *target.flags, *flags, *include, "-c", str(source), "-o", str(product)], target)
+    return product
+
+
+def _run(command: list[str], target: Target) -> str:
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise TargetError(f"target {target.name}: {command[0]} could not be run: {error}") from error
+    if done.returncode:
+        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+        raise TargetError(f"target {target.name}: {command[0]} refused: {complaint.strip()}")
+    return done.stdout
+
+
+def _emulate(image: Path, target: Target, shop: Path) -> bytes:
+    """Run an image in the emulator; return what it wrote."""
+    quiet = ["-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config", "enable=on,target=native"]
+    command = [*target.emulator, *quiet, "-kernel", str(image)]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=PATIENCE, cwd=shop, stdin=subprocess.DEVNULL
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        raise TargetError(f"target {target.name}: the emulator could not be run: {error}") from error
+    if done.returncode:
+        meaning = {3: "could not write its results", 4: "stopped with a fault", 5: "had its init refuse"}
+        raise TargetError(
+            f"target {target.name}: the program {meaning.get(done.returncode, f'ended with {done.returncode}')}"
+            f"{': ' + done.stderr.strip().splitlines()[0] if done.stderr.strip() else ''}"
+        )
+    return (shop / "words.bin").read_bytes()
+
+
+def _size(objects: list[Path], target: Target) -> tuple[int, int, int]:
+    rows = _run([_tool(target, "size"), *map(str, objects)], target).splitlines()[1:]
+    columns = [[int(number) for number in row.split()[:3]] for row in rows]
+    return tuple(sum(column) for column in zip(*columns, strict=True))  # type: ignore[return-value]
+
+
+def _read(raw: bytes, text: int, data: int, bss: int, bound: stack.Stack, compiler: str) -> Measured:
+    head = np.frombuffer(raw[: 8 * _NUMBERS], np.uint64).astype(int)
+    steps, outputs, empty, init, init_stack, step_stack, state, params = head
+    counts = np.frombuffer(raw[8 * _NUMBERS : 8 * (_NUMBERS + steps)], np.uint64).astype(int)
+    rest = raw[8 * (_NUMBERS + steps) :]
+    word = np.dtype(np.uint64 if len(rest) == 8 * steps * outputs else np.uint32)
+    words = np.frombuffer(rest, word).reshape(steps, outputs)
+    return Measured(
+        words, counts - empty, int(init - empty), int(step_stack), int(init_stack),
+        bound, int(state), int(params), text, data, bss, compiler,
+    )  # fmt: skip
