@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,16 +48,22 @@ def _print(title: str, found: list[Check], plot: Path | None) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    console = Console(soft_wrap=True)
-    table = Table(title=escape(title))
-    for name, justify in (("check", "left"), ("scheme", "left"), ("value", "right"), ("limit", "right"), ("", "left")):
+    table = Table(title=escape(title), title_justify="left")
+    for name, justify in (("check", "left"), ("value", "right"), ("limit", "left"), ("", "left")):
         table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     colours = {"ok": "green", "note": "cyan", "warn": "yellow", "fail": "red"}
-    for one in found:
-        limit = f"{'>=' if one.at_least else '<='} {one.limit:.4g} {one.unit.replace('-', '')}".rstrip()
-        verdict = f"[{colours[one.verdict]}]{one.verdict}[/]"
-        table.add_row(one.name, escape(one.scheme), f"{one.value:.4g}", limit, verdict)
-    console.print(table, soft_wrap=False)
+    for scheme, group in itertools.groupby(found, key=lambda one: one.scheme):
+        if scheme:
+            table.add_section()
+            table.add_row(f"[bold]{escape(scheme)}[/]")
+        for one in group:
+            unit = "" if one.unit == "-" else f" {one.unit}"
+            limit = f"{'>=' if one.at_least else '<='} {one.limit:.4g}{unit}"
+            table.add_row(one.name, f"{one.value:.4g}", limit, f"[{colours[one.verdict]}]{one.verdict}[/]")
+    # Nothing is cut, however narrow the terminal: a line that is too long runs on.
+    console = Console(soft_wrap=True)
+    console.width = max(console.width, Console(width=1000).measure(table).maximum)
+    console.print(table, soft_wrap=False, crop=False)
     told: dict[tuple[str, ...], list[str]] = {}
     for one in found:
         if one.verdict != "ok":

@@ -193,7 +193,7 @@ def test_a_turn_through_the_shadow_set_claims_no_drift(mode):
 
 def test_strange_measurements_leave_bounded_commands_and_recovery(rng):
     """2000 steps, a third of them with strange numbers; then good ones: memory finite, no bad status."""
-    step = casadi_gnc.load("huang2019/free_axes").step("observers_pinv")
+    step = casadi_gnc.load("huang2019/free_axes_two_observers").step("observers_pinv")
     calm = np.zeros(10)
     state = {"good": calm, "m": np.zeros(15), "actuators": np.zeros(4)}
     for k in range(2000):
@@ -320,7 +320,7 @@ def test_robust_answers_are_those_of_the_linear_limit():
 
 def test_free_axes_with_all_of_the_printed_noise():
     """Without the observer of the attitude 1e-3 is kept; with it, as printed, ten times worse."""
-    good, printed = flown("free_axes", "observer_pinv"), flown("free_axes", "observers_pinv")
+    good, printed = flown("free_axes", "observer_pinv"), flown("free_axes_two_observers", "observers_pinv")
     assert good.metrics["settling_time"] < 30
     assert good.metrics["steady_attitude"] < 1.5e-3
     assert printed.metrics["steady_attitude"] > 5 * good.metrics["steady_attitude"]

@@ -13,13 +13,24 @@ from typing import Any
 
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import ProblemError
-from casadi_gnc.missions.checking import allocation, authority, funnels, gains, noise, numbers, sampling, synthesis
+from casadi_gnc.missions.checking import (
+    allocation,
+    authority,
+    funnels,
+    gains,
+    geometry,
+    noise,
+    numbers,
+    sampling,
+    synthesis,
+)
 from casadi_gnc.missions.loading import load, read
 from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.missions.toml_place import describe
 
 #: Families in the order in which they are told.
 FAMILIES: tuple[Callable[[Mission, Scheme], Iterable[Check]], ...] = (
+    geometry.checks,
     authority.checks,
     funnels.checks,
     gains.checks,
@@ -78,7 +89,7 @@ def as_data(checks: list[Check]) -> list[dict[str, Any]]:
             "name": each.name,
             "scheme": each.scheme,
             "value": _plain(each.value),
-            "limit": each.limit,
+            "limit": _plain(each.limit),
             "sense": "at least" if each.at_least else "at most",
             "margin": _plain(each.margin),
             "unit": each.unit,

@@ -18,25 +18,21 @@ from casadi_gnc.missions.mission import Mission, Scheme
 
 #: Commands at which the slope is taken, as a share of the limits.
 _SMALL = 1e-3
+#: An effort that is lost altogether is not turned around.
+ROUNDING = 1e-6
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield the worst eigenvalue over the true effectivenesses, for actuators that push both ways."""
-    truths = mission.truths(mission, scheme)
-    lower, upper = np.array(scheme.actuation.lower), np.array(scheme.actuation.upper)
-    if not truths or not np.all((lower < 0) & (upper > 0)):
+    """Yield the worst eigenvalue over the true effectivenesses, and what a rate limit leaves of a turning effort."""
+    yield from _rate(mission, scheme)
+    if not mission.truths(mission, scheme) or not pushes_both_ways(scheme):
         return
-    slope = allocation_slope(mission, scheme)
-    scale = np.diag(np.array(scheme.actuation.limit_above))
-    found = {
-        name: float(np.linalg.eigvals(np.linalg.solve(scale, truth @ slope @ scale)).real.min())
-        for name, truth in truths.items()
-    }
+    found = least_real_parts(mission, scheme, allocation_slope(mission, scheme))
     worst = min(found, key=lambda name: found[name])
     yield Check(
         "allocation.sign",
         found[worst],
-        0.0,
+        -ROUNDING,
         "-",
         "fail",
         f"With {worst} some wanted effort comes out turned around: the loop drives itself away.",
@@ -44,6 +40,41 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "least real part of an eigenvalue of (true effectiveness) x (slope of the allocation)",
         at_least=True,
     )
+
+
+def _rate(mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield whether rate-limited actuators follow an effort that stands still while the craft turns under it."""
+    actuation, plant = scheme.actuation, mission.truth
+    if not np.isfinite(actuation.rate) or "rate" not in plant.state.names:
+        return
+    turning = float(np.linalg.norm(np.array(mission.start)[plant.state.place("rate")]))
+    stroke = float((np.array(actuation.upper) - np.array(actuation.lower)).max())
+    yield Check(
+        "allocation.rate",
+        turning * stroke / 2,
+        actuation.rate,
+        "1/s",
+        "fail",
+        "While the craft turns as at the start, the actuators cannot follow an effort that is fixed in space: what "
+        "they make lags behind and may drive the turn.",
+        "Take actuators that change faster, or limit the effort until the turn is slower.",
+        "initial rate times half the stroke of an actuator, units of the actuators per second",
+    )
+
+
+def pushes_both_ways(scheme: Scheme) -> bool:
+    """Return whether every actuator pushes and pulls, so that the allocation has a slope at rest."""
+    lower, upper = np.array(scheme.actuation.lower), np.array(scheme.actuation.upper)
+    return bool(np.all((lower < 0) & (upper > 0)))
+
+
+def least_real_parts(mission: Mission, scheme: Scheme, slope: np.ndarray) -> dict[str, float]:
+    """Return the least real part of the torque map's eigenvalues by what is true."""
+    scale = np.diag(np.array(scheme.actuation.limit_above))
+    return {
+        name: float(np.linalg.eigvals(np.linalg.solve(scale, truth @ slope @ scale)).real.min())
+        for name, truth in mission.truths(mission, scheme).items()
+    }
 
 
 def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:

@@ -3,35 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 from scipy.optimize import linprog
 
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.checking.linear import rows_of, target_state
+from casadi_gnc.missions.checking import standing
+from casadi_gnc.missions.checking.allocation import allocation_slope, pushes_both_ways
 from casadi_gnc.missions.mission import Mission, Scheme
 
-#: Times of the flight at which disturbances are looked at.
-_TIMES = 200
+#: Part of the load that may be left over where all of it is borne.
+_BORNE = 1e-6
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield rank, conditioning, the share of the virtual-control box that is made, and the static demand."""
-    matrix = believed(mission, scheme)
-    strength = np.linalg.svd(scale(scheme) @ matrix, compute_uv=False)
-    rank_gap = float(strength[-1] / strength[0]) if strength[0] > 0 else 0.0
-    yield Check(
-        "geometry.effectiveness",
-        rank_gap,
-        1e-6,
-        "-",
-        "fail",
-        "Some effort cannot be made by any combination of the actuators.",
-        "Add or turn an actuator.",
-        "smallest over largest singular value of the effectiveness, rows scaled by their limits",
-        at_least=True,
-    )
+    """Yield the share of the virtual-control box that is made, and what standing still at the target takes."""
     share = attainable_share(mission, scheme)
     yield Check(
         "authority.virtual_control",
@@ -54,7 +42,18 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
             "fail",
             "At rest at the target the disturbance alone needs more than the actuators and limits give.",
             "Raise the limits, add actuators, or accept that the target is not held.",
-            "least share of actuator bounds and limits that cancels the plant's acceleration at the target",
+            "least share of actuator bounds and limits that cancels the plant's acceleration at the target, any time",
+        )
+    if mission.target and pushes_both_ways(scheme) and scheme.actuation.inverse is None:
+        yield Check(
+            "authority.allocated_demand",
+            allocated_demand(mission, scheme, allocation_slope(mission, scheme)),
+            1.0,
+            "-",
+            "fail",
+            "As this allocation shares it out, standing still at times takes more than the limits: it drifts off.",
+            "Raise the limits of the effort, or allocate against the errors and faults that take the effort away.",
+            "effort that cancels disturbance and faults through (true effectiveness) x (slope of the allocation)",
         )
 
 
@@ -63,12 +62,6 @@ def believed(mission: Mission, scheme: Scheme) -> np.ndarray:
     quiet = ca.DM.zeros(mission.truth.noise.size)
     y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), quiet))
     return np.array(ca.DM(scheme.actuation.matrix(mission.truth.measurement.split(y))).full())
-
-
-def scale(scheme: Scheme) -> np.ndarray:
-    """Return the matrix that scales efforts by their limits, (R, R)."""
-    below, above = (np.abs(np.array(each)) for each in (scheme.actuation.limit_below, scheme.actuation.limit_above))
-    return np.diag(1 / np.maximum(below, above))
 
 
 def attainable_share(mission: Mission, scheme: Scheme) -> float:
@@ -94,23 +87,24 @@ def static_demand(mission: Mission, scheme: Scheme) -> float:
     """Return the largest share, over the flight, of bounds and limits needed to stand still at the target."""
     if not mission.target:
         return float("nan")
-    plant, rows = mission.truth, rows_of(mission)
-    t, actuators = ca.SX.sym("t"), plant.inputs.symbol("actuators")
-    x = ca.DM(target_state(mission))
-    rate = ca.SX(plant.rate(t, x, actuators, ca.DM.zeros(plant.noise.size)))[rows]
-    pushed = ca.Function("pushed", [t], [ca.substitute(rate, actuators, 0), ca.jacobian(rate, actuators)])
-    times = np.linspace(0, mission.timing.duration, _TIMES)
-    drift = np.array(pushed.map(_TIMES)(times)[0])
-    gain = np.array(pushed(0.0)[1])
-    moved = np.abs(gain).max(axis=1) > 0
     actuation, matrix = scheme.actuation, believed(mission, scheme)
-    extremes = {int(k) for row in drift[moved] for k in (row.argmin(), row.argmax())}
+    lower, upper, below, above = (
+        tuple(each) for each in (actuation.lower, actuation.upper, actuation.limit_below, actuation.limit_above)
+    )
+    return _static_demand(mission, matrix.tobytes(), matrix.shape, lower, upper, below, above)
+
+
+@lru_cache(maxsize=8)
+def _static_demand(mission: Mission, data: bytes, shape: tuple[int, int], *box: tuple[float, ...]) -> float:
+    """Return the share for one believed effectiveness and one box; schemes often have the same."""
+    matrix = np.frombuffer(data).reshape(shape)
+    lower, upper, below, above = (np.array(each) for each in box)
+    _, drift, gain = standing.loads(mission)
+    kept = standing.lasting(gain)
+    drift, gain, n = drift[kept], gain[kept], shape[1]
     shares = []
-    for k in extremes:
+    for k in {int(k) for row in drift.T for k in (row.argmin(), row.argmax())}:
         # Variables: actuators, s; bounds and limits grow with s.
-        n = matrix.shape[1]
-        lower, upper = np.array(actuation.lower), np.array(actuation.upper)
-        above, below = np.array(actuation.limit_above), np.array(actuation.limit_below)
         found = linprog(
             np.r_[np.zeros(n), 1.0],
             A_ub=np.vstack(
@@ -122,9 +116,24 @@ def static_demand(mission: Mission, scheme: Scheme) -> float:
                 ]
             ),
             b_ub=np.zeros(2 * n + 2 * len(matrix)),
-            A_eq=np.column_stack([gain[moved], np.zeros(int(moved.sum()))]),
-            b_eq=-drift[moved, k],
+            A_eq=np.column_stack([gain[k], np.zeros(len(gain[k]))]),
+            b_eq=-drift[k],
             bounds=[(None, None)] * n + [(0, None)],
         )
         shares.append(found.x[-1] if found.status == 0 else float("inf"))
     return float(max(shares, default=float("nan")))
+
+
+def allocated_demand(mission: Mission, scheme: Scheme, slope: np.ndarray) -> float:
+    """Return the largest share of bounds and limits that standing still takes through an allocation F = slope u."""
+    _, drift, gain = standing.loads(mission)
+    kept = standing.lasting(gain)
+    wanted = standing.efforts(mission, slope)[kept]
+    made = wanted @ slope.T
+    left = np.einsum("kij,kj->ki", gain[kept], made) + drift[kept]
+    if np.abs(left).max(initial=0.0) > _BORNE * np.abs(drift).max(initial=0.0):
+        return float("inf")
+    actuation = scheme.actuation
+    shares = [wanted / np.array(actuation.limit_above), wanted / np.array(actuation.limit_below)]
+    shares += [made / np.array(actuation.upper), made / np.array(actuation.lower)]
+    return float(np.hstack(shares).max(initial=0.0))

@@ -9,6 +9,7 @@ is taken where it is largest between the start and the target, so the answer is 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -17,13 +18,17 @@ from scipy.optimize import linprog
 
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.checking.authority import believed
-from casadi_gnc.missions.checking.linear import LinearLoop, target_state
+from casadi_gnc.missions.checking.linear import loop_at, target_state
 from casadi_gnc.missions.mission import Funnel, Mission, Scheme
 
 #: Intervals of the grid, over the time in which the funnel comes within 1 % of its floor.
-_GRID = 120
-#: Steps with which a continuous loop is followed at most.
-_SAMPLES = 20_000
+_GRID = 80
+#: Steps with which a continuous loop is followed at most; exact for a load that is held over each.
+_SAMPLES = 4_000
+#: Share of a funnel that is as good as infinite.
+_BEYOND = 1e12
+#: Widest start of a funnel of MRPs whose corners are still less than half a turn away.
+_HALF_TURN = 3**-0.5
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
@@ -52,11 +57,48 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
                 "Widen the floor, sample faster, or let the observer estimate the disturbance sooner.",
                 "linearised loop at the end of the flight under the plant's own disturbance, last half of the flight",
             )
+        if _is_attitude(mission, funnel):
+            yield from attitude_range(mission, funnel)
+
+
+def _is_attitude(mission: Mission, funnel: Funnel) -> bool:
+    layout = mission.truth.measurement
+    place, unit = layout.place(funnel.signal), {s.name: s.unit for s in layout.signals}[funnel.signal]
+    return place.stop - place.start == 3 and unit == "-"
+
+
+def attitude_range(mission: Mission, funnel: Funnel) -> Iterator[Check]:
+    """Yield whether MRPs start, and may go, less than half a turn away: in a funnel they cannot change sets."""
+    y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), ca.DM.zeros(mission.truth.noise.size)))
+    start = float(ca.norm_2(y[mission.truth.measurement.place(funnel.signal)]))
+    yield Check(
+        f"funnel.half_turn.{funnel.signal}",
+        start,
+        1.0,
+        "-",
+        "fail",
+        "The attitude starts more than half a turn away: the law turns the long way round, or the other set of MRPs "
+        "that the plant changes to lies outside the funnel.",
+        "Give the same attitude as minus the vector over its square, and fit the funnel to that.",
+        "norm of the MRPs at the start",
+    )
+    bounds = funnel.bounds
+    widest = float(np.array(ca.DM(bounds.start * ca.fmax(bounds.below, bounds.above))).max())
+    yield Check(
+        f"funnel.corner.{funnel.signal}",
+        widest,
+        _HALF_TURN,
+        "-",
+        "note",
+        "A corner of the funnel lies beyond half a turn: the funnel alone does not keep the attitude from there.",
+        "Narrow the funnel's start if the manoeuvre allows it.",
+        "half width at the start against 1/sqrt(3)",
+    )
 
 
 def floor_use(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     """Return the largest share of the funnel's last width that the disturbance takes."""
-    loop = LinearLoop(mission, scheme, mission.timing.duration)
+    loop = loop_at(mission, scheme, mission.timing.duration)
     samples = mission.timing.samples - 1 if loop.sampled else min(mission.timing.samples - 1, _SAMPLES)
     if not np.isfinite(loop.matrix).all():
         return float("inf")
@@ -65,14 +107,26 @@ def floor_use(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     names = [name for name, values in mission.target.items() for _ in values]
     signal = path[:, [name == funnel.signal for name in names]]
     lower, upper = (np.array(ca.DM(wall)).ravel() for wall in funnel.bounds.walls(mission.timing.duration))
-    share = np.maximum(signal / upper, signal / lower)
-    return float(share.max()) if np.isfinite(share).all() else float("inf")
+    share = float(np.maximum(signal / upper, signal / lower).max())
+    return share if share < _BEYOND else float("inf")
 
 
 def needed_share(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     """Return the least share of the actuators' bounds and effort limits that keeps the funnel."""
+    actuation, matrix = scheme.actuation, believed(mission, scheme)
+    box = (actuation.lower, actuation.upper, actuation.limit_below, actuation.limit_above)
+    return _needed_share(mission, funnel, matrix.tobytes(), matrix.shape, *(tuple(each) for each in box))
+
+
+@lru_cache(maxsize=8)
+def _needed_share(
+    mission: Mission, funnel: Funnel, data: bytes, shape: tuple[int, int], *box: tuple[float, ...]
+) -> float:
+    """Return the share for one believed effectiveness and one box; schemes often have the same."""
+    matrix = np.frombuffer(data).reshape(shape)
+    most_below, most_above, limit_below, limit_above = (np.array(each) for each in box)
     times, drift, gain, place, speed = _second_order(mission, funnel)
-    bounds, actuation = funnel.bounds, scheme.actuation
+    bounds = funnel.bounds
     walls = [np.array([np.array(ca.DM(wall)).ravel() for wall in bounds.walls(t)]) for t in times]
     axes, count, steps = gain.shape[0], gain.shape[1], len(times) - 1
     h = times[1] - times[0]
@@ -82,16 +136,15 @@ def needed_share(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     reach = sparse.kron(weight, gain, format="csr")
     free = (place + times[1:, None] * speed + (weight @ drift)).ravel()
     lower, upper = np.array([w[0] for w in walls[1:]]).ravel(), np.array([w[1] for w in walls[1:]]).ravel()
-    matrix = believed(mission, scheme)
     eye = sparse.identity(steps, format="csr")
     ones = np.ones((steps, 1))
     blocks = [
         sparse.hstack([reach, np.zeros((steps * axes, 1))]),
         sparse.hstack([-reach, np.zeros((steps * axes, 1))]),
-        sparse.hstack([sparse.identity(steps * count), -np.kron(ones, np.c_[actuation.upper])]),
-        sparse.hstack([-sparse.identity(steps * count), np.kron(ones, np.c_[actuation.lower])]),
-        sparse.hstack([sparse.kron(eye, matrix), -np.kron(ones, np.c_[actuation.limit_above])]),
-        sparse.hstack([-sparse.kron(eye, matrix), np.kron(ones, np.c_[actuation.limit_below])]),
+        sparse.hstack([sparse.identity(steps * count), -np.kron(ones, np.c_[most_above])]),
+        sparse.hstack([-sparse.identity(steps * count), np.kron(ones, np.c_[most_below])]),
+        sparse.hstack([sparse.kron(eye, matrix), -np.kron(ones, np.c_[limit_above])]),
+        sparse.hstack([-sparse.kron(eye, matrix), np.kron(ones, np.c_[limit_below])]),
     ]
     rest = np.zeros(steps * (2 * count + 2 * len(matrix)))
     found = linprog(
@@ -113,9 +166,7 @@ def _second_order(mission: Mission, funnel: Funnel) -> tuple[np.ndarray, ...]:
     second = ca.jtimes(signal, x, rate) + ca.jacobian(signal, t)
     gain = ca.jacobian(second, actuators)
     evaluate = ca.Function("second", [t, x], [ca.substitute(second, actuators, 0), gain, signal], {"allow_free": True})
-    slowest = float(np.array(ca.DM(funnel.bounds.decay)).min())
-    horizon = min(mission.timing.duration, np.log(100.0) / slowest)
-    times = np.linspace(0.0, horizon, _GRID + 1)
+    times = np.linspace(0.0, min(mission.timing.duration, _horizon(funnel)), _GRID + 1)
     start, target = np.array(mission.start, dtype=float), target_state(mission)
     calm = target.copy()
     calm[plant.state.place(funnel.signal)] = start[plant.state.place(funnel.signal)]
@@ -124,3 +175,8 @@ def _second_order(mission: Mission, funnel: Funnel) -> tuple[np.ndarray, ...]:
     gain_there = max(gains, key=lambda g: float(np.linalg.norm(g)))
     speed = np.array(evaluate(0.0, start)[2]).ravel()
     return times, drift, gain_there, start[plant.state.place(funnel.signal)], speed
+
+
+def _horizon(funnel: Funnel) -> float:
+    """Return the time [s] in which the funnel comes within 1 % of its narrowing."""
+    return float(np.log(100.0) / np.array(ca.DM(funnel.bounds.decay)).min())

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.checking.linear import LinearLoop, spectral_radius
+from casadi_gnc.missions.checking.linear import loop_at, spectral_radius
 from casadi_gnc.missions.checking.sampling import ROUNDING
 from casadi_gnc.missions.mission import Mission, Scheme
 
@@ -17,14 +17,14 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     yield from scheme.law.checks()
     if not mission.target or not scheme.law.memory.size:
         return
-    loop = LinearLoop(mission, scheme, 0.0)
+    loop = loop_at(mission, scheme, 0.0)
     if not loop.exists:
         return
     memory = loop.memory_when_saturated
     if loop.sampled:
         value, limit, unit = spectral_radius(memory), 1 + ROUNDING, "-"
     else:
-        value, limit, unit = float(np.linalg.eigvals(memory).real.max()), ROUNDING, "1/s"
+        value, limit, unit = float(np.linalg.eigvals(memory).real.max(initial=-np.inf)), ROUNDING, "1/s"
     yield Check(
         "gains.anti_windup",
         value,

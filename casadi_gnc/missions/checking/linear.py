@@ -8,7 +8,7 @@ slope is that of plant and law together.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import casadi as ca
@@ -37,6 +37,18 @@ def target_state(mission: Mission) -> np.ndarray:
     return x
 
 
+#: Magnitude at which a growing state is held.
+_HUGE = 1e150
+#: Loops of this many (mission, scheme, time) are kept: several families look at the same ones.
+_KEPT = 16
+
+
+@lru_cache(maxsize=_KEPT)
+def loop_at(mission: Mission, scheme: Scheme, t: float) -> LinearLoop:
+    """Return the linear loop at time t [s]; asked again, the same."""
+    return LinearLoop(mission, scheme, t)
+
+
 @dataclass(frozen=True, eq=False)
 class LinearLoop:
     """Linearise the loop of one scheme at time `t` [s]."""
@@ -56,14 +68,24 @@ class LinearLoop:
         return self._jacobians[0]
 
     @property
+    def moving(self) -> np.ndarray:
+        """The `matrix` without memory that nothing moves, to first order: estimates that rest at the target."""
+        return _without_still(self.matrix, self.sampled)
+
+    @property
+    def delayed_moving(self) -> np.ndarray:
+        """The `delayed` map without memory that nothing moves."""
+        return _without_still(self.delayed, self.sampled)
+
+    @property
     def exists(self) -> bool:
         """Whether the loop has a slope at its target; laws with roots of the error have none."""
         return all(np.isfinite(each).all() for each in self._jacobians)
 
     @cached_property
     def memory_when_saturated(self) -> np.ndarray:
-        """The Jacobian of the memory alone while measurement and achieved effort stand still."""
-        return self._jacobians[1]
+        """The Jacobian of the memory alone, of what moves, while measurement and achieved effort stand still."""
+        return _without_still(self._jacobians[1], self.sampled)
 
     @cached_property
     def delayed(self) -> np.ndarray:
@@ -75,55 +97,10 @@ class LinearLoop:
         return np.vstack([top, np.hstack([c, d])]) if n + k else np.zeros((0, 0))
 
     @cached_property
-    def _parts(self) -> tuple[tapes.Symbols, tuple[Any, ...]]:
-        """The plant moved by late actuators, the memory moved by what it is told, actuators, their effort, told."""
-        mission, law = self.mission, self.scheme.law
-        s = tapes.Symbols(mission, self.scheme)
-        quiet = ca.DM.zeros(mission.truth.noise.size)
-        y = mission.truth.measure(s.t, s.x, quiet)
-        seen = tapes.law_inputs(mission, self.scheme, y)
-        memory = law.jump(s.t, seen, s.m)
-        wanted = law.command(s.t, seen, memory)
-        actuators = self.unlimited(y, wanted)
-        told = ca.SX.sym("told", wanted.numel())
-        if self.sampled:
-            x, h = s.x, mission.timing.sample_period / mission.timing.substeps
-            for i in range(mission.timing.substeps):
-                x = tapes.plant_step(mission, s.t + i * h, x, s.actuators, quiet)
-            later = advance(law, s.t, seen, memory, wanted, told)
-        else:
-            x = mission.truth.rate(s.t, s.x, s.actuators, quiet)
-            later = law.rate(s.t, seen, memory, wanted, told)
-        made = tapes.made(mission, self.scheme, y, actuators)
-        return s, (x, later, actuators, made, told)
-
-    @cached_property
-    def _closed(self) -> ca.Function:
-        """The loop as a function of (t, x, m): regulated states and memory moved, or their rates."""
-        s, (x, later, actuators, made, told) = self._parts
-        moved = ca.substitute(x, s.actuators, actuators)[rows_of(self.mission)]
-        return ca.Function("closed", [s.t, s.x, s.m], [ca.vertcat(moved, ca.substitute(later, told, made))])
-
-    @cached_property
     def _jacobians(self) -> tuple[np.ndarray, ...]:
-        mission = self.mission
-        s, (x, later, actuators, made, told) = self._parts
-        rows, memory, late = rows_of(mission), s.m.numel(), s.actuators
-        state = ca.vertcat(s.x[rows], s.m)
-        closed = ca.vertcat(ca.substitute(x, late, actuators)[rows], ca.substitute(later, told, made))
-        # With a sample of delay the actuators are a state: the plant feels the old, the law sets the new.
-        waiting = ca.vertcat(x[rows], ca.substitute(later, told, made))
-        everything = [
-            ca.jacobian(closed, state),
-            ca.jacobian(later, s.m) if memory else ca.SX(0, 0),
-            ca.jacobian(waiting, state),
-            ca.jacobian(waiting, late),
-            ca.jacobian(actuators, state),
-            ca.jacobian(actuators, late),
-        ]
-        point = ca.Function("jacobians", [s.t, s.x, s.m, told, late], everything)
-        x0, m0 = self.target
-        found: Any = point(self.t, x0, m0, np.zeros(told.numel()), np.zeros(late.numel()))
+        (x0, m0), (_, point) = self.target, _functions(self.mission, self.scheme)
+        told, late = (np.zeros(point.size1_in(i)) for i in (3, 4))
+        found: Any = point(self.t, x0, m0, told, late)
         return tuple(np.array(ca.DM(each).full()) for each in found)
 
     @cached_property
@@ -136,13 +113,15 @@ class LinearLoop:
         m0 = ca.DM(law.start(ca.DM(self.t), tapes.law_inputs(mission, self.scheme, y0)))
         return x0, np.array(m0).ravel()
 
+    @lru_cache(maxsize=1)  # noqa: B019 - loops are few and kept by `loop_at` anyway
     def pushed(self, samples: int) -> np.ndarray:
         """Return where what depends on time drives the loop from its target: regulated states, (samples, n)."""
         mission, rows = self.mission, rows_of(self.mission)
         x0, m0 = self.target
         h = mission.timing.duration / samples
         times = np.arange(samples) * h
-        moved = np.array(self._closed.map(samples)(times + (0 if self.sampled else h / 2), ca.DM(x0), ca.DM(m0))).T
+        closed, _ = _functions(mission, self.scheme)
+        moved = np.array(closed.map(samples)(times + (0 if self.sampled else h / 2), ca.DM(x0), ca.DM(m0))).T
         size = self.matrix.shape[0]
         if self.sampled:
             step, push = self.matrix, moved - np.concatenate([x0[rows], m0])
@@ -153,13 +132,62 @@ class LinearLoop:
         state, path = np.zeros(size), np.zeros((samples, len(rows)))
         for k in range(samples):
             path[k] = state[: len(rows)]
-            state = step @ state + push[k]
+            # An unstable part grows beyond all numbers; what it does not touch goes on.
+            state = np.clip(step @ state + push[k], -_HUGE, _HUGE)
         return path
 
-    def unlimited(self, y: Any, wanted: Any) -> Any:
-        """Return the least actuator commands that make the wanted effort, bounds left out."""
-        matrix = self.scheme.actuation.matrix(self.mission.truth.measurement.split(y))
-        return ca.mtimes(matrix.T, ca.solve(ca.mtimes(matrix, matrix.T), wanted))
+
+@lru_cache(maxsize=_KEPT)
+def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Function]:
+    """Return (t, x, m) -> regulated states and memory, moved, or their rates; and the Jacobians of that."""
+    law, s = scheme.law, tapes.Symbols(mission, scheme)
+    sampled = mission.timing.mode == "sampled"
+    quiet = ca.DM.zeros(mission.truth.noise.size)
+    y = mission.truth.measure(s.t, s.x, quiet)
+    seen = tapes.law_inputs(mission, scheme, y)
+    remembered = law.jump(s.t, seen, s.m)
+    wanted = law.command(s.t, seen, remembered)
+    actuators = unlimited(mission, scheme, y, wanted)
+    told = ca.SX.sym("told", wanted.numel())
+    if sampled:
+        x, h = s.x, mission.timing.sample_period / mission.timing.substeps
+        for i in range(mission.timing.substeps):
+            x = tapes.plant_step(mission, s.t + i * h, x, s.actuators, quiet)
+        later = advance(law, s.t, seen, remembered, wanted, told)
+    else:
+        x = mission.truth.rate(s.t, s.x, s.actuators, quiet)
+        later = law.rate(s.t, seen, remembered, wanted, told)
+    made = tapes.made(mission, scheme, y, actuators)
+    rows, late = rows_of(mission), s.actuators
+    state = ca.vertcat(s.x[rows], s.m)
+    closed = ca.vertcat(ca.substitute(x, late, actuators)[rows], ca.substitute(later, told, made))
+    # With a sample of delay the actuators are a state: the plant feels the old, the law sets the new.
+    waiting = ca.vertcat(x[rows], ca.substitute(later, told, made))
+    slopes = [
+        ca.jacobian(closed, state),
+        ca.jacobian(later, s.m) if s.m.numel() else ca.SX(0, 0),
+        ca.jacobian(waiting, state),
+        ca.jacobian(waiting, late),
+        ca.jacobian(actuators, state),
+        ca.jacobian(actuators, late),
+    ]
+    return (
+        ca.Function("closed", [s.t, s.x, s.m], [closed]),
+        ca.Function("jacobians", [s.t, s.x, s.m, told, late], slopes),
+    )
+
+
+def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:
+    """Return the least actuator commands that make the wanted effort, bounds left out."""
+    matrix = scheme.actuation.matrix(mission.truth.measurement.split(y))
+    return ca.mtimes(matrix.T, ca.solve(ca.mtimes(matrix, matrix.T), wanted))
+
+
+def _without_still(matrix: np.ndarray, sampled: bool) -> np.ndarray:
+    """Return the matrix without the states that stay what they are, whatever the others do."""
+    still = np.eye(len(matrix)) if sampled else np.zeros(matrix.shape)
+    moves = np.any(~np.isclose(matrix, still, rtol=0.0, atol=1e-12), axis=1) if matrix.size else np.zeros(0, dtype=bool)
+    return matrix[np.ix_(moves, moves)]
 
 
 def command_slope(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.checks import Check
+from casadi_gnc.missions.checking.allocation import allocation_slope, pushes_both_ways
 from casadi_gnc.missions.checking.linear import command_slope, target_state
 from casadi_gnc.missions.mission import Mission, Scheme
 
@@ -32,6 +33,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "Lower the gain from measurement to command, filter the measurement, or take better sensors.",
         "direct gain of the command at the target times the noise's deviations, over the limits",
     )
+    yield from _actuators(mission, scheme)
     deviations = measurement_deviation(mission)
     for funnel in mission.funnels:
         floor = np.array(ca.DM(funnel.bounds.floor)).ravel()
@@ -41,11 +43,35 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
             float((3 * noise / floor).max()),
             1.0,
             "-",
-            "fail",
+            "fail" if scheme.law.keeps(funnel.signal) else "note",
             "Three deviations of the measurement reach the funnel's wall though the signal stands at zero.",
             "Widen the floor, or take better sensors.",
             "three standard deviations over the floor",
         )
+
+
+def _actuators(mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield the share of the actuators' bounds that noise takes, through the allocation and by which measurement."""
+    actuation = scheme.actuation
+    if not pushes_both_ways(scheme) or actuation.inverse is not None:
+        return
+    slope, _ = command_slope(mission, scheme)
+    gain = np.abs(allocation_slope(mission, scheme) @ slope @ measurement_slope(mission))
+    bounds = np.minimum(np.abs(np.array(actuation.lower)), np.abs(np.array(actuation.upper)))
+    shares = np.sqrt((gain**2).sum(axis=1)) / bounds
+    worst, layout = int(shares.argmax()), mission.truth.measurement
+    by = np.abs(allocation_slope(mission, scheme) @ slope)[worst] * measurement_deviation(mission)
+    loudest = max(layout.names, key=lambda name: float(np.linalg.norm(by[layout.place(name)])))
+    yield Check(
+        "noise.actuators",
+        float(shares[worst]),
+        NUISANCE,
+        "-",
+        "warn",
+        f"Noise alone commands this share of what actuator {worst + 1} can do, most of it from {loudest}.",
+        f"Lower the gain from {loudest} to command, filter it, or take a better sensor.",
+        "direct gain from measurement to actuators at the target times the noise's deviations, over their bounds",
+    )
 
 
 def limits(scheme: Scheme) -> np.ndarray:

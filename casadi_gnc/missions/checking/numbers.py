@@ -16,8 +16,56 @@ from casadi_gnc.missions.mission import Mission, Scheme
 _SHARE = 0.01
 
 
+def orbit(eccentricity: float, perigee: float, radius: float) -> Iterator[Check]:
+    """Yield whether an orbit is one: perigee [m] above the radius [m] of the body, not a hyperbola."""
+    yield Check(
+        "numbers.perigee",
+        perigee,
+        radius,
+        "m",
+        "warn",
+        "The orbit runs through the body that it is about.",
+        "Correct position, velocity or semi-major axis; a factor of 10 is soon lost.",
+        "perigee radius by two-body motion against the body's radius",
+        at_least=True,
+    )
+    yield Check(
+        "numbers.eccentricity",
+        eccentricity,
+        1.0,
+        "-",
+        "warn",
+        "The craft is on no orbit but on a hyperbola.",
+        "Correct position and velocity; a factor of 10 is soon lost.",
+        "eccentricity by two-body motion",
+    )
+
+
+def _tolerances(mission: Mission) -> Iterator[Check]:
+    """Yield how coarse float32 is for measured signals that a metric compares with a threshold."""
+    layout = mission.truth.measurement
+    start = np.array(
+        ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), ca.DM.zeros(mission.truth.noise.size)))
+    ).ravel()
+    asked = {m.signal: m.threshold for m in mission.metrics if m.threshold > 0 and m.signal in layout.names}
+    for signal in dict.fromkeys(asked):
+        finest = min(m.threshold for m in mission.metrics if m.signal == signal and m.threshold > 0)
+        largest = np.abs(start[layout.place(signal)]).max()
+        yield Check(
+            f"numbers.resolution.{signal}",
+            float(np.spacing(np.float32(largest))) / finest,
+            _SHARE,
+            "-",
+            "note",
+            "In float32 the signal itself is too coarse for the threshold that it is held against.",
+            "Measure it relative to something near, or generate the law in double precision.",
+            "unit in the last place of the largest value at the start, over the metric's threshold",
+        )
+
+
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield how far the rounding of measurements to float32 moves the command, as a share of the limits."""
+    """Yield how fine measured signals are in float32, and what share of the limits their rounding moves the command."""
+    yield from _tolerances(mission)
     slope, y = command_slope(mission, scheme)
     if not np.isfinite(slope).all():
         return

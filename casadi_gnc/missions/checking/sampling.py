@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
-from casadi_gnc.missions.checking.linear import LinearLoop, spectral_radius
+from casadi_gnc.laws import Law
+from casadi_gnc.missions.checking.linear import loop_at, spectral_radius
 from casadi_gnc.missions.mission import Mission, Scheme
 
 #: An eigenvalue on the unit circle (an integrator, an estimate that nothing excites) is no instability.
 ROUNDING = 1e-6
+#: Shortest sample period [s] that is looked at, and the part to which the longest is found.
+_SHORTEST, _FINE = 1e-5, 0.01
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
@@ -21,7 +26,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     yield from _hold(scheme)
     if not mission.target:
         return
-    loops = [LinearLoop(mission, scheme, t) for t in (0.0, mission.timing.duration)]
+    loops = [loop_at(mission, scheme, t) for t in (0.0, _settled(mission))]
     # Printed laws may have gains beyond all numbers late in the flight: that is a finding, not a gap.
     if not loops[0].exists:
         yield Check(
@@ -37,7 +42,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         return
     h = mission.timing.sample_period
     if mission.timing.mode == "continuous":
-        poles: Any = np.concatenate([_eigenvalues(loop.matrix) for loop in loops])
+        poles: Any = np.concatenate([_eigenvalues(loop.moving) for loop in loops])
         yield Check(
             "sampling.closed_loop",
             float(poles.real.max(initial=-np.inf)),
@@ -46,7 +51,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
             "fail",
             "A mode of the loop grows although nothing is saturated.",
             "Change the gains until every pole lies on the left.",
-            "linearisation at the target, begin and end of the flight",
+            "linearisation at the target, at the begin and when funnels have stopped narrowing",
         )
         yield Check(
             "sampling.runge_kutta",
@@ -61,17 +66,17 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         return
     yield Check(
         "sampling.closed_loop",
-        max(spectral_radius(loop.matrix) for loop in loops),
+        max(spectral_radius(loop.moving) for loop in loops),
         1 + ROUNDING,
         "-",
         "fail",
         f"Held for {h:g} s, the loop's own commands make it grow.",
         "Sample faster, or lower the gains of the fastest part.",
-        "spectral radius of the sampled loop at the target, begin and end of the flight",
+        "spectral radius of the sampled loop at the target, at the begin and when funnels have stopped narrowing",
     )
     yield Check(
         "sampling.delay",
-        max(spectral_radius(loop.delayed) for loop in loops),
+        max(spectral_radius(loop.delayed_moving) for loop in loops),
         1 + ROUNDING,
         "-",
         "note",
@@ -79,6 +84,20 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "Command the actuators in the sample in which they are computed, or sample faster.",
         "spectral radius with the actuators one sample late",
     )
+
+
+def _settled(mission: Mission) -> float:
+    """Return the end of the flight [s], or a later time at which the funnels have their last width within 0.1 %.
+
+    In between a loop may be unstable for a while that is too short to matter.
+    """
+    times = [mission.timing.duration]
+    for funnel in mission.funnels:
+        start, floor, decay = (
+            np.array(ca.DM(each)) for each in (funnel.bounds.start, funnel.bounds.floor, funnel.bounds.decay)
+        )
+        times += list((np.log(1e3 * np.maximum(start / floor, 1.0)) / decay).ravel())
+    return float(max(times))
 
 
 def amplification(z: np.ndarray) -> np.ndarray:
@@ -90,6 +109,27 @@ def _eigenvalues(matrix: np.ndarray) -> Any:
     return np.linalg.eigvals(matrix) if np.isfinite(matrix).all() else np.array([complex(np.nan)])
 
 
+def _longest(law: Law) -> float:
+    """Return the longest sample period [s] that a law accepts, which refuses its own; 0 if there is none."""
+
+    def accepts(hold: float) -> bool:
+        try:
+            replace(law, hold=hold).check_hold()
+        except LawError:
+            return False
+        return True
+
+    low, high = law.hold / 2, law.hold
+    while not accepts(low):
+        low, high = low / 2, low
+        if high < _SHORTEST:
+            return 0.0
+    while high - low > _FINE * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if accepts(middle) else (low, middle)
+    return low
+
+
 def _hold(scheme: Scheme) -> Iterator[Check]:
     """Yield a failure where the law itself refuses its sample time."""
     try:
@@ -98,10 +138,10 @@ def _hold(scheme: Scheme) -> Iterator[Check]:
         yield Check(
             "sampling.hold",
             scheme.law.hold,
-            0.0,
+            _longest(scheme.law),
             "s",
             "fail",
-            f"{error}.",
+            f"{str(error)[:1].upper()}{str(error)[1:]}.",
             "Sample faster, or take a law that bears the hold.",
             "the law's own limit",
         )
