@@ -243,7 +243,7 @@ class VirtualMachineEngine:
         for k in range(first, first + samples):
             t, noise = k * self._timing.sample_period, self._draw(k)
             s = self._control(carried, t, carried.x, carried.m, noise)
-            flags = s.flags + s.allocation_flags + tape["judge"](s.y, s.limited, s.actuators)
+            flags = s.flags + s.allocation_flags
             carried.good[:] = s.y
             row = tape["observe"](t, carried.x, s.y, s.m, s.wanted, s.limited, s.actuators, flags, s.report)
             carried.tally[:] = tape["tally"](row, carried.tally)

@@ -10,7 +10,6 @@ draw      uniform -> noise, normal numbers                      (where the plant
 sense     t, x, noise -> y
 before    t, y, good, m, actuators -> accepted, m, wanted, limited, lower, upper, flags
 allocate  y, limited, actuators, lower, upper -> actuators      (where the allocation is symbolic)
-judge     y, limited, actuators -> flags
 after     t, y, m, wanted, limited, actuators -> m              (sampled mode)
 plant     t, x, actuators, noise -> x, one Runge-Kutta step     (sampled mode)
 flow      t, x, y, m, wanted, limited, actuators, noise -> x', m'     (continuous mode, other allocation)
@@ -24,7 +23,8 @@ tally     row, tally -> tally, the running metrics
 ========  =====================================================================================
 
 `wanted` is the law's command, `limited` the same inside the virtual-control box, `actuators` what
-they are told, `good` the last accepted measurement. Of these, before, allocate, judge and after fly.
+they are told, `good` the last accepted measurement. Of these, before, allocate and after fly, and
+what `judge` adds to the status.
 """
 
 from __future__ import annotations
@@ -257,7 +257,9 @@ def _observe(mission: Mission, scheme: Scheme, s: Any) -> ca.Function:
         **scheme.law.show(s.t, seen, s.m),
         **shown,
         **vars(report.split(noted)),
-        status=flags + sum(bit.value * flag for bit, flag in outside.items()),
+        status=flags
+        + judge(mission, scheme, s.y, s.limited, s.actuators)
+        + sum(bit.value * flag for bit, flag in outside.items()),
     )
     ports = {"t": s.t, "x": s.x, "y": s.y, "m": s.m, "wanted": s.wanted, "limited": s.limited}
     return function("observe", {**ports, "actuators": s.actuators, "flags": flags, "report": noted}, {"row": row})
@@ -273,11 +275,6 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
     tapes = {
         "sense": function("sense", {"t": s.t, "x": s.x, "noise": s.noise}, {"y": plant.measure(s.t, s.x, s.noise)}),
         "before": function("before", before_ports, before(mission, scheme, s)),
-        "judge": function(
-            "judge",
-            {"y": s.y, "limited": s.limited, "actuators": s.actuators},
-            {"flags": judge(mission, scheme, s.y, s.limited, s.actuators)},
-        ),
         "settle": function("settle", {"x": s.x}, {"settled": plant.settle(s.x)}),
         "observe": _observe(mission, scheme, s),
     }

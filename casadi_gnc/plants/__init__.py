@@ -4,7 +4,7 @@ from casadi_gnc.plants._plant import Plant
 from casadi_gnc.plants.combined_spacecraft import BodyPart, CombinedSpacecraft, compose_inertia
 from casadi_gnc.plants.docking_pair import DockingPair, FaultPiece, FaultProfile, MeasurementNoise
 from casadi_gnc.plants.drag_free_pair import DragFreePair
-from casadi_gnc.plants.environment import HarmonicTorque
+from casadi_gnc.plants.environment import Harmonics
 from casadi_gnc.plants.proximity_pair import OrbitalDisturbance, ProximityPair, RelativeSensor
 from casadi_gnc.plants.wheel_spacecraft import SensorError, WheelSpacecraft
 
@@ -15,7 +15,7 @@ __all__ = [
     "DragFreePair",
     "FaultPiece",
     "FaultProfile",
-    "HarmonicTorque",
+    "Harmonics",
     "MeasurementNoise",
     "OrbitalDisturbance",
     "Plant",

@@ -26,7 +26,7 @@ import casadi as ca
 
 from casadi_gnc import attitude
 from casadi_gnc.plants._plant import Plant
-from casadi_gnc.plants.environment import HarmonicTorque
+from casadi_gnc.plants.environment import Harmonics
 from casadi_gnc.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 
@@ -47,7 +47,7 @@ class CombinedSpacecraft(Plant):
 
     body: RigidBody
     effectiveness: ca.DM
-    disturbance: HarmonicTorque = HarmonicTorque()
+    disturbance: Harmonics = Harmonics()
     rate_limit: float = 10.0
 
     @property
@@ -74,7 +74,7 @@ class CombinedSpacecraft(Plant):
     def rate(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
         """Return x' (eqs 1 and 14)."""
         now = self.state.split(x)
-        torque = self.torque(actuators) + self.disturbance.torque(t)
+        torque = self.torque(actuators) + self.disturbance.at(t)
         return self.state.pack(
             mrp=attitude.mrp_rate(now.mrp, now.rate),
             rate=self.body.acceleration(now.mrp, now.rate, torque),

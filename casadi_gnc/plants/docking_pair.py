@@ -35,7 +35,7 @@ import casadi as ca
 from casadi_gnc import dipoles
 from casadi_gnc.dipoles import TargetDipole
 from casadi_gnc.plants._plant import Plant
-from casadi_gnc.plants.environment import HarmonicTorque
+from casadi_gnc.plants.environment import Harmonics
 from casadi_gnc.relative_motion import EllipticOrbit, PairModel
 from casadi_gnc.signals import Layout, Signal
 
@@ -103,7 +103,7 @@ class DockingPair(Plant):
     model : what the flight software believes; `lumped_disturbance` is counted from it, its mass
         scales the fault, and `miss` is the way from its port.
     actuator : "moment" [A m^2] or "force" [N].
-    on_chaser, on_target : outer forces w_C and w_T, [N]; `HarmonicTorque` is a sum of any unit.
+    on_chaser, on_target : outer forces w_C and w_T, [N].
     fault : f(t).
     position_error, velocity_error : v(t), [m] and [m/s].
     white : noise on top of them.
@@ -116,11 +116,11 @@ class DockingPair(Plant):
     target: TargetDipole
     model: PairModel
     actuator: Literal["moment", "force"] = "moment"
-    on_chaser: HarmonicTorque = HarmonicTorque()
-    on_target: HarmonicTorque = HarmonicTorque()
+    on_chaser: Harmonics = Harmonics()
+    on_target: Harmonics = Harmonics()
     fault: FaultProfile = FaultProfile()
-    position_error: HarmonicTorque = HarmonicTorque()
-    velocity_error: HarmonicTorque = HarmonicTorque()
+    position_error: Harmonics = Harmonics()
+    velocity_error: Harmonics = Harmonics()
     white: MeasurementNoise = MeasurementNoise()
     reach: float = 1e6
     speed_limit: float = 1e3
@@ -178,7 +178,7 @@ class DockingPair(Plant):
     def measure(self, t: Any, x: Any, noise: Any) -> Any:
         """Return relative position and velocity with their errors."""
         now = self.state.split(x)
-        position, velocity = now.position + self.position_error.torque(t), now.velocity + self.velocity_error.torque(t)
+        position, velocity = now.position + self.position_error.at(t), now.velocity + self.velocity_error.at(t)
         if self.noise.size:
             drawn = self.noise.split(noise)
             position = position + self.white.position * drawn.position
@@ -195,7 +195,7 @@ class DockingPair(Plant):
 
     def disturbance(self, t: Any) -> Any:
         """Return d(t), (3,), [N], of the outer forces."""
-        chaser, target = self.on_chaser.torque(t), self.on_target.torque(t)
+        chaser, target = self.on_chaser.at(t), self.on_target.at(t)
         return (self.target_mass * chaser - self.chaser_mass * target) / (self.chaser_mass + self.target_mass)
 
     def acceleration(self, t: Any, x: Any, force: Any) -> Any:

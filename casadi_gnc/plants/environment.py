@@ -1,4 +1,4 @@
-"""Disturbances from outside: torque that is constant plus a few harmonics."""
+"""What comes from outside or from sensors: a constant plus a few harmonics."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import casadi as ca
 
 
 @dataclass(frozen=True)
-class HarmonicTorque:
-    """Model d(t) = constant + sum_k amplitude_k sin(frequency_k t + phase_k), body frame.
+class Harmonics:
+    """Model d(t) = constant + sum_k amplitude_k sin(frequency_k t + phase_k), of any unit.
 
-    Huang, Biggs, Duan (2020), section 5.1.
+    Huang, Biggs, Duan (2020), section 5.1, has it for a torque.
 
     Parameters
     ----------
-    constant : (3,), [N m].
+    constant : (3,).
     frequencies : K numbers, [rad/s].
-    amplitudes : K rows of three numbers, [N m].
+    amplitudes : K rows of three numbers, unit of the constant.
     phases : K angles, [rad]; all zero if left out.
     """
 
@@ -27,8 +27,8 @@ class HarmonicTorque:
     amplitudes: tuple[tuple[float, ...], ...] = ()
     phases: tuple[float, ...] = ()
 
-    def torque(self, t: Any) -> Any:
-        """Return d(t), (3,), [N m]."""
+    def at(self, t: Any) -> Any:
+        """Return d(t), (3,), at time t [s]."""
         total = ca.DM(list(self.constant))
         phases = self.phases or (0.0,) * len(self.frequencies)
         for frequency, amplitude, phase in zip(self.frequencies, self.amplitudes, phases, strict=True):

@@ -39,7 +39,7 @@ import casadi as ca
 from casadi_gnc import attitude
 from casadi_gnc.actuator_faults import FaultSchedule
 from casadi_gnc.plants._plant import Plant
-from casadi_gnc.plants.environment import HarmonicTorque
+from casadi_gnc.plants.environment import Harmonics
 from casadi_gnc.reaction_wheels import Gyrostat
 from casadi_gnc.signals import Layout, Signal
 
@@ -81,7 +81,7 @@ class WheelSpacecraft(Plant):
     """
 
     body: Gyrostat
-    disturbance: HarmonicTorque = HarmonicTorque()
+    disturbance: Harmonics = Harmonics()
     axis_faults: FaultSchedule = FaultSchedule(3)
     wheel_faults: FaultSchedule | None = None
     attitude_error: SensorError = SensorError()
@@ -154,7 +154,7 @@ class WheelSpacecraft(Plant):
         """Return x' (eqs 1 and 14)."""
         now = self.state.split(x)
         acceleration = self.acceleration(t, now.wheel_speed, actuators)
-        torque = self.torque(t, acceleration) + self.disturbance.torque(t)
+        torque = self.torque(t, acceleration) + self.disturbance.at(t)
         torque += self.body.coupling(now.rate, now.wheel_speed)
         return self.state.pack(
             mrp=attitude.mrp_rate(now.mrp, now.rate),

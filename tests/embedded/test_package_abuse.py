@@ -5,6 +5,7 @@ import pytest
 from packages import C99, made, run, units
 
 import casadi_gnc
+import casadi_gnc.laws
 from casadi_gnc.embedded.compare import as_numbers, as_words
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.missions.package import describe
@@ -172,13 +173,22 @@ LAWS = [
     ("huang2020/slew", "funnel_pinv", "float32", 1_000_000),
     ("huang2020/slew", "pd_pinv", "float64", 1_000_000),
     ("huang2020/detumble", "observer_pinv", "float64", 1_000_000),
+    ("huang2020/detumble", "damping_pinv", "float64", 1_000_000),
     ("huang2019/nominal", "observers_pinv", "float64", 1_000_000),
+    ("huang2019/nominal", "finite_time_pinv", "float64", 1_000_000),
     ("shi2020/docking", "iobc", "float64", 1_000_000),
+    ("shi2020/docking_as_printed", "dobc", "float64", 1_000_000),
     ("sun2018/circular_orbit", "tracking", "float64", 1_000_000),
     ("tao2019/case1", "funnels", "float64", 1_000_000),
     ("huang2020/slew", "funnel_robust", "float64", 20_000),
     ("huang2020/slew", "funnel_robust", "float32", 5_000),
 ]
+
+
+def test_every_law_is_fuzzed():
+    """A new law is added to the list, or this fails."""
+    flown = {type(casadi_gnc.load(problem).scheme(scheme).law) for problem, scheme, *_ in LAWS}
+    assert flown == set(casadi_gnc.laws.LAWS.values())
 
 
 @pytest.mark.parametrize("case", LAWS, ids=lambda case: f"{case[0]}-{case[1]}-{case[2]}")

@@ -5,7 +5,7 @@ import numpy as np
 
 from casadi_gnc import attitude
 from casadi_gnc.integrators import runge_kutta
-from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
+from casadi_gnc.plants import BodyPart, CombinedSpacecraft, Harmonics, compose_inertia
 from casadi_gnc.rigid_body import RigidBody
 
 INERTIA = np.array([[0.54, 0.06, 0.04], [0.06, 1.33, -0.07], [0.04, -0.07, 1.42]])
@@ -41,7 +41,7 @@ def test_runge_kutta_converges_at_order_4():
     plant = CombinedSpacecraft(
         RigidBody(ca.DM(INERTIA), (0.0, 1e-2, -2e-2), 1e-3),
         ca.DM.zeros(3, 12),
-        HarmonicTorque((1e-2, 0, 0), (0.3,), ((0.0, 0.02, 0.01),)),
+        Harmonics((1e-2, 0, 0), (0.3,), ((0.0, 0.02, 0.01),)),
     )
     truth = fly(plant, 0.0125, 20.0)
     errors = [np.abs(fly(plant, h, 20.0) - truth).max() for h in (0.4, 0.2, 0.1)]
@@ -65,7 +65,7 @@ def test_disturbance_is_the_papers(detumble):
     t = np.array([0.0, 10.0, 62.5, 777.0])
     a, b = np.sin(np.pi * t / 125), np.sin(np.pi * t / 200)
     expected = 1e-4 * np.array([1 + a + 1.5 * b, 2 + 1.5 * a - 2 * b, -1 + 2 * a - 1.5 * b])
-    found = np.hstack([np.array(detumble.truth.disturbance.torque(time)) for time in t])
+    found = np.hstack([np.array(detumble.truth.disturbance.at(time)) for time in t])
     assert np.allclose(found, expected, atol=1e-18)
 
 

@@ -11,7 +11,7 @@ from casadi_gnc import dipoles
 from casadi_gnc.dipoles import TargetDipole
 from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.plants.docking_pair import DockingPair, FaultPiece, FaultProfile, MeasurementNoise
-from casadi_gnc.plants.environment import HarmonicTorque
+from casadi_gnc.plants.environment import Harmonics
 from casadi_gnc.relative_motion import EllipticOrbit, PairModel
 
 MU, A, E = 3.986e14, 1e7, 0.15
@@ -126,8 +126,8 @@ def test_moment_and_force_are_one_actuator_seen_twice(rng):
 def test_lumped_disturbance_is_what_the_model_lacks():
     """Put into the model beside the force, it gives the true acceleration."""
     plant = pair(
-        on_chaser=HarmonicTorque((0.1, 0.15, 0.2), (0.3,), ((0.2, 0.0, -0.1),), (0.4,)),
-        on_target=HarmonicTorque((0.1, 0.2, 0.3), (0.3,), ((0.1, 0.0, 0.0),)),
+        on_chaser=Harmonics((0.1, 0.15, 0.2), (0.3,), ((0.2, 0.0, -0.1),), (0.4,)),
+        on_target=Harmonics((0.1, 0.2, 0.3), (0.3,), ((0.1, 0.0, 0.0),)),
         fault=FaultProfile((0.08, 0.09, 0.04), (FaultPiece(0.0, 5.0, 1.0),)),
     )
     x, force = ca.DM([2.0, 3.0, 4.0, 0.1, -0.2, 0.3, 0.4]), ca.DM([5.0, -3.0, 1.0])
@@ -142,7 +142,7 @@ def test_outer_forces_act_on_each_craft_by_its_own_mass():
     push = (0.3, -0.2, 0.1)
     free = np.array(pair().rate(0.0, x, ca.DM.zeros(3), ca.DM(0, 1)))[3:6].ravel()
     for name, expected in (("on_chaser", np.array(push) / MASS_C), ("on_target", -np.array(push) / MASS_T)):
-        pushed = pair(**{name: HarmonicTorque(constant=push)})
+        pushed = pair(**{name: Harmonics(constant=push)})
         found = np.array(pushed.rate(0.0, x, ca.DM.zeros(3), ca.DM(0, 1)))[3:6].ravel() - free
         assert np.allclose(found, expected, atol=1e-15)
 
@@ -164,8 +164,8 @@ def test_fault_profile_is_table_1():
 
 def test_measurement_has_its_errors():
     plant = pair(
-        position_error=HarmonicTorque(frequencies=(0.01 * math.pi,), amplitudes=((4e-4, 5e-4, 6e-4),)),
-        velocity_error=HarmonicTorque(frequencies=(0.01 * math.pi,), amplitudes=((2e-5, 2e-5, 2e-5),)),
+        position_error=Harmonics(frequencies=(0.01 * math.pi,), amplitudes=((4e-4, 5e-4, 6e-4),)),
+        velocity_error=Harmonics(frequencies=(0.01 * math.pi,), amplitudes=((2e-5, 2e-5, 2e-5),)),
         white=MeasurementNoise(1e-3, 2e-3),
     )
     x, drawn = ca.DM([2.0, 3.0, 4.0, 0.1, 0.2, 0.3, 0.4]), ca.DM([1.0, -1.0, 0.5, 2.0, 0.0, -1.0])

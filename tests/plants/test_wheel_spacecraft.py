@@ -10,7 +10,7 @@ from casadi_gnc import reaction_wheels as wheels
 from casadi_gnc.actuator_faults import ActuatorFault, FaultSchedule
 from casadi_gnc.attitude import frame_rotation
 from casadi_gnc.integrators import runge_kutta
-from casadi_gnc.plants import HarmonicTorque
+from casadi_gnc.plants import Harmonics
 from casadi_gnc.plants.wheel_spacecraft import SensorError, WheelSpacecraft
 
 J = np.array([[12.0, 0.4, -0.3], [0.4, 14.0, 0.2], [-0.3, 0.2, 22.0]])
@@ -18,7 +18,7 @@ MOUNTED = np.column_stack([np.eye(3), np.full(3, 3**-0.5)])
 ROTATION = frame_rotation(np.pi / 4, np.pi / 7, np.pi / 3)
 C, JW = np.array(wheels.free_axes(ROTATION, MOUNTED)), 0.338
 START = np.array([0.3, -0.2, 0.4, 0.05, -0.08, 0.06, 90.0, -60.0, 40.0, 20.0])
-HARMONIC = HarmonicTorque((0.01, -0.02, 0.0), (0.3, 0.2), ((0.05, 0, 0.01), (0.0, 0.03, 0)), (np.pi / 2, 0.0))
+HARMONIC = Harmonics((0.01, -0.02, 0.0), (0.3, 0.2), ((0.05, 0, 0.01), (0.0, 0.03, 0)), (np.pi / 2, 0.0))
 
 
 def craft(orbit_rate=0.0, **changes) -> WheelSpacecraft:

@@ -30,7 +30,7 @@ from casadi_gnc.missions.schema import (
     law_tables,
     orientation,
 )
-from casadi_gnc.plants import BodyPart, CombinedSpacecraft, HarmonicTorque, compose_inertia
+from casadi_gnc.plants import BodyPart, CombinedSpacecraft, Harmonics, compose_inertia
 from casadi_gnc.rigid_body import RigidBody
 from casadi_gnc.thrusters import ThrusterGeometry
 
@@ -143,9 +143,9 @@ class Environment(Part):
     constant_torque_N_m: Vector = [0.0, 0.0, 0.0]
     harmonic: list[Harmonic] = []
 
-    def disturbance(self) -> HarmonicTorque:
+    def disturbance(self) -> Harmonics:
         """Return the torque that acts besides gravity."""
-        return HarmonicTorque(
+        return Harmonics(
             tuple(self.constant_torque_N_m),
             tuple(harmonic.frequency_rad_per_s for harmonic in self.harmonic),
             tuple(tuple(harmonic.amplitude_N_m) for harmonic in self.harmonic),

@@ -22,7 +22,7 @@ from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.crafts import Craft, Where
 from casadi_gnc.missions.mission import Actuation, Panel
 from casadi_gnc.missions.schema import MissionModel, NonNegative, Part, Positive, SchemeModel, Vector, law_tables
-from casadi_gnc.plants import DockingPair, FaultPiece, FaultProfile, HarmonicTorque, MeasurementNoise
+from casadi_gnc.plants import DockingPair, FaultPiece, FaultProfile, Harmonics, MeasurementNoise
 from casadi_gnc.relative_motion import EllipticOrbit, PairModel
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
@@ -106,9 +106,9 @@ class OuterForce(Part):
     constant_N: Vector = [0.0, 0.0, 0.0]
     harmonic: list[Harmonic] = []
 
-    def force(self) -> HarmonicTorque:
+    def force(self) -> Harmonics:
         """Return the force as a function of time."""
-        return HarmonicTorque(
+        return Harmonics(
             tuple(self.constant_N),
             tuple(each.frequency_rad_per_s for each in self.harmonic),
             tuple(tuple(each.amplitude_N) for each in self.harmonic),
@@ -172,9 +172,9 @@ class Sensors(Part):
     position_deviation_m: NonNegative = 0.0
     velocity_deviation_m_per_s: NonNegative = 0.0
 
-    def sine(self, amplitude: list[float]) -> HarmonicTorque:
+    def sine(self, amplitude: list[float]) -> Harmonics:
         """Return an error that is a sine of these amplitudes."""
-        return HarmonicTorque(frequencies=(self.error_frequency_rad_per_s,), amplitudes=(tuple(amplitude),))
+        return Harmonics(frequencies=(self.error_frequency_rad_per_s,), amplitudes=(tuple(amplitude),))
 
 
 class Initial(Part):
