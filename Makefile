@@ -16,8 +16,9 @@ OUT ?= out
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
 
+# One BLAS thread a process: two processes share the cores.
 test: .venv/installed-dev lint
-	$(BIN)/python -m pytest -q -n 2
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .

@@ -44,7 +44,7 @@ def test_a_wrong_optimum_with_a_dual_bound_of_its_own_is_caught():
 
 def test_synthesis_runs_every_back_end(tmp_path):
     results = run("synthesis", ["lmis/feasible_3", "lmis/infeasible_3"], tmp_path, settings=Settings(
-        samples=1, passes=1, cold_passes=1, time_limit=10.0
+        samples=1, passes=1, cold_passes=1, time_limit=60.0
     ))  # fmt: skip
     rows = whole(results)
     assert set(rows) == set(synthesis.contestants(None)) >= {"clarabel", "barrier"}

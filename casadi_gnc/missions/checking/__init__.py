@@ -55,7 +55,7 @@ def check(mission: Mission, scheme: str | None = None) -> list[Check]:
     >>> from casadi_gnc.missions.checking import check
     >>> found = check(casadi_gnc.load("huang2020/slew_as_printed"), "funnel_pinv")
     >>> [each.name for each in found if each.verdict == "fail"]
-    ['gains.anti_windup', 'sampling.closed_loop', 'sampling.runge_kutta']
+    ['funnel.floor.mrp', 'gains.anti_windup', 'sampling.closed_loop']
     """
     chosen = mission.schemes if scheme is None else (mission.scheme(scheme),)
     return [
