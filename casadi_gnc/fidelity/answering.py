@@ -11,7 +11,6 @@ import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from functools import cache
 from importlib import metadata
 from multiprocessing import get_context
 from pathlib import Path
@@ -24,6 +23,7 @@ from casadi_gnc.fidelity.claims import ClaimModel, ClaimsFile
 from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.fidelity.verdict import Answer
 from casadi_gnc.files import write_beside
+from casadi_gnc.missions.loading import read
 from casadi_gnc.status import StepStatus
 
 Progress = Callable[[int, int], None]
@@ -42,13 +42,11 @@ class Question:
     kind: str
     content: str
 
-    @property
-    def key(self) -> str:
-        """Hash of the question and of all that could change its answer."""
-        return hashlib.sha256(f"{self.kind}\n{self.content}\n{_surroundings()}".encode()).hexdigest()
+    def key(self, surroundings: str) -> str:
+        """Return the hash of the question and of all that could change its answer."""
+        return hashlib.sha256(f"{self.kind}\n{self.content}\n{surroundings}".encode()).hexdigest()
 
 
-@cache
 def _surroundings() -> str:
     """Return the hash of this package, the C sources, the problem files and the versions below."""
     digest = hashlib.sha256()
@@ -58,8 +56,8 @@ def _surroundings() -> str:
             if path.suffix in (".py", ".c", ".h", ".j2", ".toml", ".csv") and path.name != "claims.toml":
                 digest.update(path.relative_to(folder).as_posix().encode())
                 digest.update(path.read_bytes())
-    for package in ("casadi", "numpy", "scipy", "clarabel"):
-        digest.update(metadata.version(package).encode())
+    for package in sorted(metadata.distributions(), key=lambda each: each.name):
+        digest.update(f"{package.name} {package.version}".encode())
     return digest.hexdigest()
 
 
@@ -77,12 +75,21 @@ def _questions(claims: list[ClaimModel]) -> dict[Question, list[tuple[str, str]]
     for flight, askers in flights.items():
         content = {
             "flight": json.loads(flight),
+            "problem_sha256": _digest(json.loads(flight)["problem"]),
             "metric": [{"name": claim.id, **claim.metric} for claim in askers if claim.metric is not None],
             "status": {claim.id: claim.status.model_dump() for claim in askers if claim.status is not None},
         }
         question = Question("flight", json.dumps(content, sort_keys=True))
         asked[question] = [(claim.id, "ours") for claim in askers]
     return asked
+
+
+def _digest(problem: str) -> str:
+    """Return the hash of a problem file's text; of one that cannot be read, nothing: its flight says why."""
+    try:
+        return hashlib.sha256(read(problem)[1].encode()).hexdigest()
+    except GncError:
+        return ""
 
 
 def answer(
@@ -113,10 +120,9 @@ def answer(
 
 def _answered(questions: list[Question], processes: int, fresh: bool) -> Iterator[tuple[Question, dict[str, Any]]]:
     """Yield questions with their answers as they come, those in the cache first."""
-    folder = compilers.cache_folder() / "claims"
-    missing = []
+    folder, surroundings, missing = compilers.cache_folder() / "claims", _surroundings(), []
     for question in questions:
-        known = None if fresh else _remembered(folder / f"{question.key}.json")
+        known = None if fresh else _remembered(folder / f"{question.key(surroundings)}.json")
         if known is None:
             missing.append(question)
         else:
@@ -126,12 +132,24 @@ def _answered(questions: list[Question], processes: int, fresh: bool) -> Iterato
     with ProcessPoolExecutor(min(processes, len(missing)), mp_context=get_context("spawn")) as pool:
         running: dict[Future, Question] = {pool.submit(find, question): question for question in missing}
         for future in as_completed(running):
-            question, found = running[future], future.result()
+            question, found = running[future], _result(future)
             if "failure" not in found:
                 folder.mkdir(parents=True, exist_ok=True)
                 text = json.dumps(found)
-                write_beside(folder / f"{question.key}.json", lambda path, text=text: path.write_text(text))
+                write_beside(
+                    folder / f"{question.key(surroundings)}.json", lambda path, text=text: path.write_text(text)
+                )
             yield question, found
+
+
+def _result(future: Future) -> dict[str, Any]:
+    """Return what a process found; whatever ended it is the failure of its question alone."""
+    try:
+        return future.result()
+    except GncError as error:
+        return {"failure": str(error)}
+    except Exception as error:  # of a computation, or a process that died: a row, not the end
+        return {"failure": f"{type(error).__name__}: {error}"}
 
 
 def _remembered(path: Path) -> dict[str, Any] | None:
@@ -142,14 +160,11 @@ def _remembered(path: Path) -> dict[str, Any] | None:
 
 
 def find(question: Question) -> dict[str, Any]:
-    """Return {"values": numbers by name}, or {"failure": one sentence}."""
+    """Return {"values": numbers by name}; raise what keeps a question from being answered."""
     content = json.loads(question.content)
-    try:
-        if question.kind == "computation":
-            return {"values": {"value": float(COMPUTATIONS[content["name"]](**content["arguments"]))}}
-        return {"values": _fly(**content)}
-    except (GncError, TypeError, KeyError) as error:
-        return {"failure": str(error)}
+    if question.kind == "computation":
+        return {"values": {"value": float(COMPUTATIONS[content["name"]](**content["arguments"]))}}
+    return {"values": _fly(content["flight"], content["metric"], content["status"])}
 
 
 def _fly(flight: dict[str, Any], metric: list[dict[str, Any]], status: dict[str, Any]) -> dict[str, float | None]:

@@ -70,9 +70,10 @@ class Answer:
         return Verdict.NOT_REPRODUCED
 
     def _passes(self, bound: float) -> bool:
-        """Return whether the printed number lies beyond what is possible."""
+        """Return whether the printed number, with its tolerance, lies beyond what is possible."""
         claim = self.claim
-        return claim.printed < bound if claim.bound_is == "lowest" else claim.printed > bound
+        beyond = bound - claim.printed if claim.bound_is == "lowest" else claim.printed - bound
+        return beyond > max(claim.tolerance * abs(claim.printed), claim.tolerance_absolute)
 
     def as_data(self) -> dict[str, Any]:
         """Return the row as plain data, ready for JSON."""

@@ -1,7 +1,8 @@
 """Change single values of a problem file's content, by the path at which they stand.
 
 A path is written with dots, `truth.inertia_factor`; an item of a list of tables is taken by its name,
-`scheme.funnel_robust.law.attitude_gain`, or by its number from 1, `fault.2.bias_N_m`.
+`scheme.funnel_robust.law.attitude_gain`, or by its number from 1, `fault.2.bias_N_m`; `*` stands for
+every item, `scheme.*.force_limit_N.*`.
 """
 
 from __future__ import annotations
@@ -23,26 +24,28 @@ def changed(data: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """
     result = copy.deepcopy(data)
     for path, value in changes.items():
-        *way, last = path.split(".")
-        at: Any = result
-        for depth, part in enumerate(way):
-            at = _inside(at, part, path, ".".join(way[:depth]) or "the file")
-        if isinstance(at, list):
-            at[_number(at, last, path, ".".join(way))] = copy.deepcopy(value)
-        elif isinstance(at, dict):
-            at[last] = copy.deepcopy(value)
-        else:
-            raise ProblemError(f"{path!r} leads into {'.'.join(way)}, which is {at!r} and has no parts")
+        _put(result, path.split("."), value, path, "the file")
     return result
 
 
-def _inside(at: Any, part: str, path: str, where: str) -> Any:
-    if isinstance(at, list):
-        return at[_number(at, part, path, where)]
-    if isinstance(at, dict) and part in at:
-        return at[part]
-    known = ", ".join(at) if isinstance(at, dict) else repr(at)
-    raise ProblemError(f"{path!r} leads nowhere: {where} has no {part!r}, but {known}")
+def _put(at: Any, parts: list[str], value: Any, path: str, where: str) -> None:
+    """Set, in place, what the parts of a path lead to."""
+    part, rest = parts[0], parts[1:]
+    for key in _keys(at, part, path, where, last=not rest):
+        if rest:
+            _put(at[key], rest, value, path, part if where == "the file" else f"{where}.{part}")
+        else:
+            at[key] = copy.deepcopy(value)
+
+
+def _keys(at: Any, part: str, path: str, where: str, *, last: bool) -> list[Any]:
+    """Return the keys or places that one part of a path stands for."""
+    if isinstance(at, list) and at:
+        return list(range(len(at))) if part == "*" else [_number(at, part, path, where)]
+    if isinstance(at, dict) and (part in at or part == "*" or last):
+        return list(at) if part == "*" else [part]
+    told = f"has no {part!r}, but {', '.join(at)}" if isinstance(at, dict) else f"is {at!r} and has no parts"
+    raise ProblemError(f"{path!r} leads nowhere: {where} {told}")
 
 
 def _number(items: list[Any], part: str, path: str, where: str) -> int:

@@ -5,7 +5,6 @@ A sweep is nothing but changed copies of the file's content, checked and built l
 
 from __future__ import annotations
 
-import copy
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import Any
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.files import write_beside
 from casadi_gnc.missions import building, loading, toml_place
+from casadi_gnc.missions.changing import changed
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.flying import fly
 from casadi_gnc.missions.mission import Mission
@@ -60,11 +60,12 @@ def load_sweeps(problem: str | Path) -> tuple[Sweep, ...]:
         place = toml_place.describe(path, text, ("sweep", i))
         missions = []
         for number, value in enumerate(table.values, 1):
-            changed = copy.deepcopy(data)
-            if not _set(changed, table.key.split("."), value):
-                raise ProblemError(f"{table.key!r} leads to no table or list of the file", place)
             try:
-                mission = building.build(loading.check(changed, path, text), path, text)
+                copy = changed(data, {table.key: value})
+            except ProblemError as error:
+                raise ProblemError(str(error), place) from None
+            try:
+                mission = building.build(loading.check(copy, path, text), path, text)
             except ProblemError as error:
                 raise ProblemError(f"with {table.key} = {value!r}: {error}", place) from None
             missions.append(replace(mission, name=f"{mission.name}_{table.name}_{number}"))
@@ -73,25 +74,6 @@ def load_sweeps(problem: str | Path) -> tuple[Sweep, ...]:
             raise ProblemError(f"show is {table.show!r}, expected one of {', '.join(known)}", place)
         sweeps.append(Sweep(table.name, table.key, table.show, tuple(table.values), tuple(missions)))
     return tuple(sweeps)
-
-
-def _set(content: Any, path: Sequence[str], value: Any) -> bool:
-    """Set what a path leads to, in place; return whether it leads anywhere."""
-    part, rest = path[0], path[1:]
-    places: list[Any]
-    if isinstance(content, list):
-        named = [i for i, item in enumerate(content) if isinstance(item, dict) and item.get("name") == part]
-        places = list(range(len(content))) if part == "*" else named
-    elif isinstance(content, dict):
-        places = list(content) if part == "*" else [part]
-    else:
-        return False
-    if not rest:
-        for each in places:
-            content[each] = value
-        return bool(places)
-    inside = [content[each] for each in places if not isinstance(content, dict) or each in content]
-    return bool(inside) and all(_set(each, rest, value) for each in inside)
 
 
 def fly_sweep(

@@ -71,7 +71,7 @@ def fly(tmp_path, text: str, *options: str) -> subprocess.CompletedProcess:
             "a sample period of 0.1 s is too long for filter_frequency 15 rad/s; use at most 0.0667 s",
         ),
         ("record_period_s = 0.01", "record_period_s = 7.7e-4", "record_period_s / sample_period_s is 1.54"),
-        ("[[metric]]", SWEEP.replace("force_limit_N.*", "force.*") + "[[metric]]", "leads to no table or list"),
+        ("[[metric]]", SWEEP.replace("force_limit_N.*", "force.*") + "[[metric]]", "leads nowhere"),
         ("[[metric]]", SWEEP.replace("FUNNEL_LEFT", "left") + "[[metric]]", "show is 'left', expected one of"),
         ("[[metric]]", SWEEP.replace("5]", "-5]") + "[[metric]]", "with scheme.*.force_limit_N.* = -5.0: "),
     ],

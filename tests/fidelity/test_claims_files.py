@@ -98,6 +98,46 @@ metric = { kind = "peak", signal = "rate" }
     assert "no scheme 'nobody'" in nobody["failure"]
 
 
+def test_a_computation_that_breaks_is_a_row(tmp_path):
+    asked = 'computation = { name = "huang2020.rotation_entry", arguments = { row = 9, column = 9 } }'
+    path = tmp_path / "claims.toml"
+    path.write_text(HEAD + CUBE.format(printed=1.0, name="x").replace('computation = { name = "x" }', asked))
+    told = run(str(path), "--json")
+    assert told.returncode == 1
+    (row,) = json.loads(told.stdout)["papers"][0]["claims"]
+    assert row["verdict"] == "failed"
+    assert row["failure"].startswith("IndexError")
+
+
+def test_a_changed_problem_file_is_flown_again(tmp_path):
+    """The cache knows a user's own problem file by its content."""
+    from casadi_gnc import assets
+
+    problem = tmp_path / "mine.toml"
+    text = (assets.folder("problems") / "sun2018" / "circular_orbit.toml").read_text()
+    text = text.replace("duration_s = 250.0", "duration_s = 0.02")
+    claim = (
+        HEAD
+        + f"""
+[[claim]]
+id = "speed"
+text = "the first speed"
+where = "here"
+printed = 1.0
+flight = {{ problem = "{problem}", scheme = "tracking" }}
+metric = {{ kind = "peak", signal = "velocity_error" }}
+"""
+    )
+    (tmp_path / "claims.toml").write_text(claim)
+    found = []
+    for speed in (0.5, 4.0):
+        problem.write_text(text.replace("velocity_error_m_per_s = [0.5,", f"velocity_error_m_per_s = [{speed},"))
+        (answered,) = fidelity.answer(fidelity.read_claims(str(tmp_path / "claims.toml")), processes=1)
+        found.append(answered.ours)
+    assert found[0] == pytest.approx(0.5, rel=0.05)
+    assert found[1] == pytest.approx(4.0, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

@@ -112,6 +112,7 @@ def test_sdp_has_the_optimum_of_a_third_method():
 def test_statics_of_the_printed_fault():
     """0.2 N m of bias less the largest disturbance of that axis, at half strength; PD gain 14."""
     assert huang2019.static_torque("huang2019/nominal") == pytest.approx((0.2 - 0.005) / 0.5, rel=1e-12)
+    assert huang2019.resting_mean("huang2019/nominal", 50.0, 100.0) == pytest.approx(0.195, rel=1e-12)
     assert huang2019.static_torque("huang2019/tough") == pytest.approx((0.2 - 0.05) / 0.5, rel=1e-12)
     assert huang2019.static_attitude("huang2019/nominal") == pytest.approx(0.195 / 7, rel=1e-12)
 

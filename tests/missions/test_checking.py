@@ -25,6 +25,7 @@ from casadi_gnc.missions.mission import Actuation, Funnel, Mission, Scheme, Timi
 from casadi_gnc.plants import Plant
 from casadi_gnc.signals import Layout, Signal
 
+TURNED = ca.DM([[1.0, -1.0], [1.0, 1.0]]) / 2**0.5
 STATE = Layout((Signal("place", 1, "m", limit=1e3), Signal("speed", 1, "m/s", limit=1e3)))
 EFFORT = Layout((Signal("force", 1, "N"),))
 
@@ -109,6 +110,13 @@ def test_runge_kutta_limit_is_that_of_the_real_axis():
         assert only(check(chosen), "sampling.runge_kutta").verdict == verdict
 
 
+def test_rounding_of_an_undamped_mode_does_not_hide_the_integrator():
+    """A mode of 50 rad/s at 0.1 s: the step multiplies it by some 20, whichever way its damping is rounded."""
+    for damping in (0.0, -1e-9):
+        chosen = mission(Spring(stiffness=2500.0, damping=damping), mode="continuous")
+        assert only(check(chosen), "sampling.runge_kutta").value == pytest.approx(21.5, rel=0.02)
+
+
 def test_a_growing_loop_fails_in_both_modes():
     for mode in ("sampled", "continuous"):
         chosen = mission(Spring(stiffness=-1.0, hold=0.1 if mode == "sampled" else 0.0), mode=mode)
@@ -139,6 +147,39 @@ def test_static_demand_is_the_push_over_the_limit():
         found = only(check(chosen), "authority.static_demand")
         assert found.value == pytest.approx(push * np.sin(1.0), rel=1e-2)
         assert found.verdict == verdict
+
+
+def test_static_demand_looks_between_the_extremes_of_single_axes():
+    """A load that turns at 0.8 N before two actuators of 0.7 N at 45 degrees: worst along an actuator, 0.8/0.7."""
+
+    @dataclass(frozen=True, eq=False)
+    class Plane(Cart):
+        state = measurement = Layout((Signal("place", 2, "m", limit=1e3), Signal("speed", 2, "m/s", limit=1e3)))
+        inputs = Layout((Signal("push", 2, "N"),))
+
+        def rate(self, t, x, actuators, noise):
+            load = 0.8 * ca.vertcat(ca.cos(0.0628 * t), ca.sin(0.0628 * t))
+            return ca.vertcat(x[2:], ca.mtimes(TURNED, actuators) + load)
+
+    @dataclass(frozen=True, eq=False)
+    class Springs(Spring):
+        inputs = Plane.state
+
+        def command(self, t, y, m):
+            return -y[:2] - 2 * y[2:]
+
+    force = Layout((Signal("force", 2, "N"),))
+    actuation = Actuation(TURNED, [-0.7] * 2, [0.7] * 2, float("inf"), [-5.0] * 2, [5.0] * 2, Direct(), effort=force)
+    chosen = replace(
+        mission(),
+        truth=Plane(),
+        start=[0.0] * 4,
+        schemes=(Scheme("springs", Springs(hold=0.1), actuation),),
+        target={"place": [0.0] * 2, "speed": [0.0] * 2},
+    )
+    found = only(check(chosen), "authority.static_demand")
+    assert found.value == pytest.approx(0.8 / 0.7, rel=1e-3)  # the grid of times passes within 1 degree of it
+    assert found.verdict == "fail"
 
 
 def test_noise_share_is_gain_times_deviation():

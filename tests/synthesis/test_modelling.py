@@ -40,7 +40,9 @@ class Family:
             self.offsets.append((block + block.T) / 2)
             self.multipliers.append((q[:, :2] * rng.uniform(0.5, 2, 2)) @ q[:, :2].T)
         images = [self.linear(*self.split(unit)) for unit in np.eye(len(self.best))]
-        self.cost = np.array([sum(np.sum(z * f) for z, f in zip(self.multipliers, image, strict=True)) for image in images])
+        self.cost = np.array(
+            [sum(np.sum(z * f) for z, f in zip(self.multipliers, image, strict=True)) for image in images]
+        )
 
     def split(self, x):
         """Return X, W, D, S and g of the scalar unknowns."""

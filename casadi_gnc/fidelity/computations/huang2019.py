@@ -146,6 +146,14 @@ def static_torque(problem: str) -> float:
     return left / share
 
 
+def resting_mean(problem: str, from_s: float, until_s: float) -> float:
+    """Return the least mean torque command from the start to `until_s` of a craft that rests after `from_s`.
+
+    Nothing is asked of the time before: the turn may take as little as it likes.
+    """
+    return static_torque(problem) * (until_s - from_s) / until_s
+
+
 def static_attitude(problem: str) -> float:
     """Return the least error of axis 2 at which the PD law commands what keeps the craft at rest."""
     law: Any = casadi_gnc.load(problem).scheme("pd_pinv").law

@@ -103,7 +103,8 @@ def _static_demand(mission: Mission, data: bytes, shape: tuple[int, int], *box: 
     kept = standing.lasting(gain)
     drift, gain, n = drift[kept], gain[kept], shape[1]
     shares = []
-    for k in {int(k) for row in drift.T for k in (row.argmin(), row.argmax())}:
+    # The share is convex in the load, so its largest may lie between the extremes of single rows: every time counts.
+    for k in range(len(drift)):
         # Variables: actuators, s; bounds and limits grow with s.
         found = linprog(
             np.r_[np.zeros(n), 1.0],

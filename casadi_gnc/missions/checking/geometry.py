@@ -32,7 +32,6 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "smallest over largest singular value of the effectiveness, rows scaled by their limits",
         at_least=True,
     )
-    # Bounds of the actuators in the units of each column, so that a weak actuator does not look like a bad place.
     conditioning = 1 / rank_gap if rank_gap > 0 else float("inf")
     yield Check(
         "geometry.conditioning",

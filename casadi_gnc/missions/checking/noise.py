@@ -20,20 +20,6 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the share of the effort limits that noise commands, and each funnel's floor against noise."""
     if not mission.truth.noise.size:
         return
-    share = float((command_deviation(mission, scheme) / limits(scheme)).max())
-    if not np.isfinite(share):
-        return  # a law without a slope at the target; sampling says so
-    yield Check(
-        "noise.authority",
-        share,
-        NUISANCE,
-        "-",
-        "fail" if share >= DROWNING else "warn",
-        "Noise alone commands this share of the limit (one standard deviation); clipped, it turns into drift.",
-        "Lower the gain from measurement to command, filter the measurement, or take better sensors.",
-        "direct gain of the command at the target times the noise's deviations, over the limits",
-    )
-    yield from _actuators(mission, scheme)
     deviations = measurement_deviation(mission)
     for funnel in mission.funnels:
         floor = np.array(ca.DM(funnel.bounds.floor)).ravel()
@@ -48,6 +34,19 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
             "Widen the floor, or take better sensors.",
             "three standard deviations over the floor",
         )
+    share = float((command_deviation(mission, scheme) / limits(scheme)).max())
+    yield Check(
+        "noise.authority",
+        share,
+        NUISANCE,
+        "-",
+        "note" if np.isnan(share) else "fail" if share >= DROWNING else "warn",
+        "Noise alone commands this share of the limit (one standard deviation); clipped, it turns into drift.",
+        "Lower the gain from measurement to command, filter the measurement, or take better sensors.",
+        "direct gain of the command at the target times the noise's deviations, over the limits",
+    )
+    if np.isfinite(share):
+        yield from _actuators(mission, scheme)
 
 
 def _actuators(mission: Mission, scheme: Scheme) -> Iterator[Check]:

@@ -45,7 +45,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         poles: Any = np.concatenate([_eigenvalues(loop.moving) for loop in loops])
         yield Check(
             "sampling.closed_loop",
-            float(poles.real.max(initial=-np.inf)),
+            float(poles.real.max()) if poles.size else -np.inf,
             ROUNDING,
             "1/s",
             "fail",
@@ -55,7 +55,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         )
         yield Check(
             "sampling.runge_kutta",
-            float(np.abs(amplification(poles[poles.real <= 0] * h)).max(initial=0.0)),
+            _amplified(poles, h),
             1 + ROUNDING,
             "-",
             "fail",
@@ -98,6 +98,13 @@ def _settled(mission: Mission) -> float:
         )
         times += list((np.log(1e3 * np.maximum(start / floor, 1.0)) / decay).ravel())
     return float(max(times))
+
+
+def _amplified(poles: Any, h: float) -> float:
+    """Return the largest factor by which a step multiplies a mode that should not grow; NaN where a pole is none."""
+    if np.isnan(poles).any():
+        return float("nan")
+    return float(np.abs(amplification(poles[poles.real <= ROUNDING] * h)).max(initial=0.0))
 
 
 def amplification(z: np.ndarray) -> np.ndarray:
