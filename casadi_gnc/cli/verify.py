@@ -16,7 +16,7 @@ def verify(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
     report: Annotated[Path | None, typer.Option(help="Write an HTML report.")] = None,
 ) -> None:
-    """Compare a package's words here and on targets, and measure it there; exit code 1 where a word differs."""
+    """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs."""
     from casadi_gnc.embedded import targets
     from casadi_gnc.missions.packaging import verify as run
 
@@ -34,7 +34,7 @@ def verify(
         _print(found)
         if report is not None:
             typer.echo(f"wrote {report}")
-    if found["words"]:
+    if found["words"] or any(not change.endswith("(added)") for change in found["edited"]):
         raise typer.Exit(1)
 
 

@@ -121,7 +121,8 @@ def check_room(folder: Path, force: bool = False) -> None:
         return
     if not (folder / MANIFEST).is_file():
         raise OutputError(f"{folder} is not empty and is no package; choose a new folder with --out")
-    changes = edited(folder)
+    # A file that was added is the user's own and stays; only what would be lost is in the way.
+    changes = [change for change in edited(folder) if not change.endswith("(added)")]
     if changes and not force:
         more = f" and {len(changes) - 3} more" if len(changes) > 3 else ""
         raise OutputError(

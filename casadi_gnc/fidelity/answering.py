@@ -169,7 +169,10 @@ def find(question: Question) -> dict[str, Any]:
 
 def _fly(flight: dict[str, Any], metric: list[dict[str, Any]], status: dict[str, Any]) -> dict[str, float | None]:
     """Return the metrics and status numbers of a flight by the ids of the claims that ask them."""
-    mission = casadi_gnc.load(flight["problem"], dict(flight["changes"], metric=metric))
+    # The scheme alone: its flight may be asked for signals that the file's other schemes do not have.
+    tables = read(flight["problem"])[2].get("scheme", [])
+    own = [table for table in tables if isinstance(table, dict) and table.get("name") == flight["scheme"]] or tables
+    mission = casadi_gnc.load(flight["problem"], {"scheme": own, **flight["changes"], "metric": metric})
     alone = mission.with_scheme(flight["scheme"])
     samples = mission.timing.samples
     engine = "vm" if samples <= _SHORT else "c"

@@ -159,6 +159,8 @@ def _undefined(
     for metric in mission.metrics:
         if values[metric.name] is None and metric.kind == "settling":
             notes.append(f"{metric.name}: never; at {end:g} s {metric.signal} was still above {metric.threshold:g}")
+        elif metric.after > end:
+            notes.append(f"{metric.name}: none; it looks from {metric.after:g} s on, and the flight ends at {end:g} s")
         elif values[metric.name] is None:
             notes.append(f"{metric.name}: none; no finite sample of {metric.signal} from {metric.after:g} to {end:g} s")
     return tuple(notes)

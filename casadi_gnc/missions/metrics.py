@@ -123,6 +123,18 @@ def read(
     return values
 
 
+def settled(time: np.ndarray, sizes: np.ndarray, threshold: float) -> float | None:
+    """Return the settling time of a recorded norm, [s], by the definition above; None if it never settles.
+
+    Parameters
+    ----------
+    time, sizes : (K,), of all samples.
+    """
+    above = np.flatnonzero(~(sizes < threshold))
+    first = int(above[-1]) + 1 if len(above) else 0
+    return float(time[first]) if first < len(time) - 1 else None
+
+
 def _samples_within(metric: Metric, last: float, period: float) -> int:
     """Return how many samples the window holds, by the comparisons that the fold makes."""
     samples = round(last / period) + 1

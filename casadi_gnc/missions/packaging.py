@@ -26,6 +26,8 @@ from casadi_gnc.missions.package_flight import fly_package, sampled
 
 #: Samples of a shipped flight, and how many of them have bad measurements at the end.
 STEPS, SPOILED = 1024, 24
+#: Most samples of one; more would make files of hundreds of megabytes.
+MOST_STEPS = 100_000
 _REALS = {"float64": "double", "float32": "float"}
 
 
@@ -66,6 +68,8 @@ def generate(
         raise PackageError(f"real is {real!r}, expected float64 or float32")
     if steps <= SPOILED:
         raise PackageError(f"steps is {steps}, expected more than {SPOILED}")
+    if steps > MOST_STEPS:
+        raise PackageError(f"steps is {steps}, expected at most {MOST_STEPS}: vectors are text in the package")
     options = Options(path.stem if name is None else name, _REALS[real])  # type: ignore[arg-type]
     boards = [targets.find(one) for one in dict.fromkeys(target)]
     for board in boards:

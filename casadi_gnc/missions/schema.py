@@ -8,6 +8,7 @@ there. The tables of a craft are declared in its file in `casadi_gnc.missions.cr
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Annotated, Any, Literal
 
 import casadi as ca
@@ -22,6 +23,8 @@ Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Rows = Annotated[list[Vector], Field(min_length=1)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0)]
+Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, description="in radians")]
+Angles = Annotated[list[Angle], Field(min_length=3, max_length=3)]
 NonNegative = Annotated[float, Field(ge=0)]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,62}$", description="letters, digits and _")]
 
@@ -45,7 +48,7 @@ class Orientation(Part):
     """How the combined frame is turned from the chaser's: a matrix or three angles, not both."""
 
     rotation: Matrix | None = Field(default=None, description="R, v_combined = R v_chaser, orthonormal to 1e-4")
-    rotation_321_rad: Vector | None = Field(default=None, description="yaw, pitch, roll of the frame: R = Rx Ry Rz")
+    rotation_321_rad: Angles | None = Field(default=None, description="yaw, pitch, roll of the frame: R = Rx Ry Rz")
 
     @field_validator("rotation")
     @classmethod
@@ -103,6 +106,10 @@ class TimingModel(Part):
         samples = self.duration_s / self.sample_period_s
         if not samples <= 1e9 or abs(samples - round(samples)) > 1e-6 * samples:
             raise ValueError(f"duration_s / sample_period_s is {samples:.6g}; expected a whole number up to 1e9")
+        if self.record_period_s is not None and self.record_period_s > self.duration_s:
+            raise ValueError(
+                f"record_period_s {self.record_period_s:g} is longer than the flight, {self.duration_s:g} s"
+            )
         kept = (self.record_period_s or self.sample_period_s) / self.sample_period_s
         if kept < 0.5 or abs(kept - round(kept)) > 1e-6 * kept:
             raise ValueError(f"record_period_s / sample_period_s is {kept:.6g}; expected a whole number")

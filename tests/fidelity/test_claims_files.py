@@ -99,14 +99,14 @@ metric = { kind = "peak", signal = "rate" }
 
 
 def test_a_computation_that_breaks_is_a_row(tmp_path):
-    asked = 'computation = { name = "huang2020.rotation_entry", arguments = { row = 9, column = 9 } }'
+    asked = 'computation = { name = "huang2020.rotation_entry", arguments = { line = 9, column = 9 } }'
     path = tmp_path / "claims.toml"
     path.write_text(HEAD + CUBE.format(printed=1.0, name="x").replace('computation = { name = "x" }', asked))
     told = run(str(path), "--json")
     assert told.returncode == 1
     (row,) = json.loads(told.stdout)["papers"][0]["claims"]
     assert row["verdict"] == "failed"
-    assert row["failure"].startswith("IndexError")
+    assert row["failure"].startswith("TypeError")
 
 
 def test_a_changed_problem_file_is_flown_again(tmp_path):

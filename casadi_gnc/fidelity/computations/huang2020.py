@@ -12,6 +12,7 @@ import casadi_gnc
 from casadi_gnc import attitude
 from casadi_gnc.allocation import AllocationProblem, solve
 from casadi_gnc.allocation.attainable import attainable
+from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.plants import BodyPart, compose_inertia
 from casadi_gnc.thrusters import ThrusterGeometry
@@ -24,6 +25,13 @@ def _angles() -> np.ndarray:
     return np.array(attitude.frame_rotation(math.pi / 4, math.pi / 7, math.pi / 3))
 
 
+def _place(number: int) -> int:
+    """Return the place of an axis, row or column given from 1 to 3."""
+    if number not in (1, 2, 3):
+        raise ProblemError(f"an axis, row or column is {number!r}, expected 1, 2 or 3")
+    return number - 1
+
+
 def rotation_defect(matrix: Rows) -> float:
     """Return the largest entry of R R' - I."""
     r = np.array(matrix)
@@ -32,7 +40,7 @@ def rotation_defect(matrix: Rows) -> float:
 
 def rotation_entry(row: int, column: int) -> float:
     """Return an entry of the rotation by its angles; rows and columns from 1."""
-    return float(_angles()[row - 1, column - 1])
+    return float(_angles()[_place(row), _place(column)])
 
 
 def _seen(positions_m: Rows, directions: Rows) -> ThrusterGeometry:
@@ -41,17 +49,17 @@ def _seen(positions_m: Rows, directions: Rows) -> ThrusterGeometry:
 
 def thruster_moment(position_m: list[float], direction: list[float], axis: int) -> float:
     """Return an element of a_i = d_i x e_i, (13), [m], of a thruster given in the chaser's frame."""
-    return float(np.array(_seen([position_m], [direction]).effectiveness)[axis - 1, 0])
+    return float(np.array(_seen([position_m], [direction]).effectiveness)[_place(axis), 0])
 
 
 def thruster_position(position_m: list[float], axis: int) -> float:
     """Return an element of d_i = R (d_si - r_c), (8), [m]."""
-    return float((_angles() @ (np.array(position_m) - 0.05))[axis - 1])
+    return float((_angles() @ (np.array(position_m) - 0.05))[_place(axis)])
 
 
 def inertia_entry(row: int, column: int, with_links: bool) -> float:
     """Return an entry of the composed inertia (70), [kg m^2], of Table 1, all parts turned by R_sc."""
-    return float(_composed(with_links)[row - 1, column - 1])
+    return float(_composed(with_links)[_place(row), _place(column)])
 
 
 def inertia_trace() -> float:

@@ -13,6 +13,7 @@ from scipy.optimize import linprog
 import casadi_gnc
 from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.flight import Flight
+from casadi_gnc.missions.metrics import settled
 from casadi_gnc.missions.synthesis_file import load_synthesis
 from casadi_gnc.synthesis import Lmis, LmiStatus, Norm, h_infinity_norm, peak_command, poles, stable_ratios
 from casadi_gnc.synthesis.analysis import gain_at
@@ -298,10 +299,10 @@ def _error(signal: str) -> tuple[np.ndarray, np.ndarray]:
 def estimate_settling(signal: str, threshold: float) -> float:
     """Return the time, [s], after which the norm of an estimate's error stays below a threshold."""
     time, error = _error(signal)
-    above = np.flatnonzero(np.linalg.norm(error, axis=1) >= threshold)
-    if len(above) and above[-1] + 1 == len(time):
+    found = settled(time, np.linalg.norm(error, axis=1), threshold)
+    if found is None:
         raise FlightError(f"the error of the {signal} does not settle below {threshold:g}")
-    return float(time[above[-1] + 1]) if len(above) else 0.0
+    return found
 
 
 def disturbance_error(after_s: float) -> float:

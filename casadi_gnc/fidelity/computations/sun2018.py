@@ -17,6 +17,7 @@ from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws.proximity_conditions import coupling_condition
 from casadi_gnc.missions.flight import Flight
+from casadi_gnc.missions.metrics import settled
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.noise import normals, uniform_count, uniforms
 
@@ -176,19 +177,13 @@ def _sizes(flight: Flight, signal: str, after_s: float = 0.0) -> np.ndarray:
     return np.linalg.norm(flight.block(signal)[flight.time >= after_s], axis=1)
 
 
-def _settling(flight: Flight, signal: str, threshold: float) -> float:
-    """Return the time, [s], after which the 2-norm stays below a threshold, infinite if it does not."""
-    above = np.flatnonzero(_sizes(flight, signal) >= threshold)
-    last = int(above[-1]) + 1 if len(above) else 0
-    return float(flight.time[last]) if last < len(flight.time) else math.inf
-
-
 def settling_ratio(scheme: str, over: str, signal: str, threshold: float) -> float:
     """Return the settling time with one scheme of the comparison over that with another; 0 if that is never."""
-    times = [_settling(_compared(name), signal, threshold) for name in (scheme, over)]
-    if math.isinf(times[0]):
+    flights = [_compared(name) for name in (scheme, over)]
+    one, other = (settled(flight.time, _sizes(flight, signal), threshold) for flight in flights)
+    if one is None:
         raise FlightError(f"with {scheme} the {signal} does not settle below {threshold:g}")
-    return times[0] / times[1]
+    return 0.0 if other is None else one / other
 
 
 def steady_ratio(scheme: str, over: str, signal: str) -> float:

@@ -50,7 +50,7 @@ def _tolerances(mission: Mission) -> Iterator[Check]:
     asked = {m.signal: m.threshold for m in mission.metrics if m.threshold > 0 and m.signal in layout.names}
     for signal in dict.fromkeys(asked):
         finest = min(m.threshold for m in mission.metrics if m.signal == signal and m.threshold > 0)
-        largest = np.abs(start[layout.place(signal)]).max()
+        largest = max(np.abs(start[layout.place(signal)]).max(), finest)
         yield Check(
             f"numbers.resolution.{signal}",
             float(np.spacing(np.float32(largest))) / finest,

@@ -53,7 +53,9 @@ class Spacecraft(Part):
 class Orbit(Part):
     """The circular orbit of the test mass, whose frame the orbiting frame is."""
 
-    altitude_m: Positive
+    altitude_m: Annotated[
+        float, Field(ge=1e5, description="above the radius of the body; below 100 km nothing falls freely")
+    ]
     body_radius_m: Positive = EARTH_RADIUS
     gravitational_parameter_m3_per_s2: Positive = EARTH_MU
 
