@@ -20,12 +20,12 @@ from casadi_gnc.laws.drag_free import DragFree
 from casadi_gnc.laws.drag_free_motions import Satellite
 from casadi_gnc.missions import matrices
 from casadi_gnc.missions.crafts import Craft, Where
+from casadi_gnc.missions.crafts.orbital_environment import Environment
 from casadi_gnc.missions.mission import Actuation, Mission, Panel
 from casadi_gnc.missions.mission import Scheme as MissionScheme
 from casadi_gnc.missions.schema import (
     Matrix,
     MissionModel,
-    NonNegative,
     Part,
     Positive,
     SchemeModel,
@@ -33,7 +33,6 @@ from casadi_gnc.missions.schema import (
     law_tables,
 )
 from casadi_gnc.plants.drag_free_pair import DragFreePair
-from casadi_gnc.plants.proximity_pair import OrbitalDisturbance
 from casadi_gnc.rigid_body import RigidBody
 
 
@@ -67,27 +66,6 @@ class Believed(Part):
     inertia_kg_m2: Matrix
 
     _spd = field_validator("inertia_kg_m2")(matrices.check_inertia)
-
-
-class Push(Part):
-    """A disturbance of the satellite, satellite frame."""
-
-    force_N: Vector = [0.0, 0.0, 0.0]
-    torque_N_m: Vector = [0.0, 0.0, 0.0]
-
-    def column(self) -> tuple[float, ...]:
-        """Return force and torque, (6,)."""
-        return (*self.force_N, *self.torque_N_m)
-
-
-class Environment(Part):
-    """Disturbances: constant + sine sin(n t) + cosine cos(n t), n the orbital rate, and a random part."""
-
-    constant: Push = Push()
-    sine: Push = Push()
-    cosine: Push = Push()
-    random_force_N: NonNegative = Field(default=0.0, description="standard deviation of each axis")
-    random_torque_N_m: NonNegative = Field(default=0.0, description="standard deviation of each axis")
 
 
 class Initial(Part):
@@ -135,16 +113,15 @@ class MissionFile(MissionModel):
 
 def build(model: MissionFile, where: Where) -> Craft:
     """Return the craft that a file describes."""
-    craft, believed, given, initial = model.spacecraft, model.believed, model.environment, model.initial
+    craft, believed, initial = model.spacecraft, model.believed, model.initial
     orbit = CircularOrbit(
         model.orbit.body_radius_m + model.orbit.altitude_m, model.orbit.gravitational_parameter_m3_per_s2
     )
-    random = (given.random_force_N,) * 3 + (given.random_torque_N_m,) * 3
     plant = DragFreePair(
         craft.mass_kg,
         RigidBody(ca.DM(craft.inertia_kg_m2)),
         orbit,
-        OrbitalDisturbance(given.constant.column(), given.sine.column(), given.cosine.column(), random),
+        model.environment.disturbance(),
         craft.rate_limit_rad_per_s,
         craft.position_limit_m,
         craft.velocity_limit_m_per_s,

@@ -19,6 +19,7 @@ from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws.proximity_conditions import coupling_condition
 from casadi_gnc.missions import matrices
 from casadi_gnc.missions.crafts import Craft, Where
+from casadi_gnc.missions.crafts.orbital_environment import Environment
 from casadi_gnc.missions.mission import Actuation, Panel
 from casadi_gnc.missions.schema import (
     Matrix,
@@ -30,7 +31,7 @@ from casadi_gnc.missions.schema import (
     Vector,
     law_tables,
 )
-from casadi_gnc.plants.proximity_pair import EFFORT, RELATIVE, OrbitalDisturbance, ProximityPair, RelativeSensor
+from casadi_gnc.plants.proximity_pair import EFFORT, RELATIVE, ProximityPair, RelativeSensor
 from casadi_gnc.proximity_motion import ProximityMotion
 from casadi_gnc.rigid_body import RigidBody
 
@@ -95,27 +96,6 @@ class Sensors(Part):
     rate_deviation_rad_per_s: NonNegative = 0.0
 
 
-class Push(Part):
-    """A disturbance of the chaser, chaser frame."""
-
-    force_N: Vector = [0.0, 0.0, 0.0]
-    torque_N_m: Vector = [0.0, 0.0, 0.0]
-
-    def column(self) -> tuple[float, ...]:
-        """Return force and torque, (6,)."""
-        return (*self.force_N, *self.torque_N_m)
-
-
-class Environment(Part):
-    """Disturbances: constant + sine sin(w_o t) + cosine cos(w_o t), w_o the orbital rate, and a random part."""
-
-    constant: Push = Push()
-    sine: Push = Push()
-    cosine: Push = Push()
-    random_force_N: NonNegative = Field(default=0.0, description="standard deviation of each axis")
-    random_torque_N_m: NonNegative = Field(default=0.0, description="standard deviation of each axis")
-
-
 class Initial(Part):
     """State at t = 0, resolved in the chaser's frame; the target's follows from it."""
 
@@ -162,15 +142,14 @@ class MissionFile(MissionModel):
 
 def build(model: MissionFile, where: Where) -> Craft:
     """Return the craft that a file describes."""
-    craft, believed, given, sensors = model.spacecraft, model.believed, model.environment, model.sensors
+    craft, believed, sensors = model.spacecraft, model.believed, model.sensors
     earth = model.orbit.gravitational_parameter_m3_per_s2
     inertia = ca.DM(craft.inertia_kg_m2)
     motion = ProximityMotion(RigidBody(inertia), craft.mass_kg, craft.hold_point_m, earth)
-    random = (given.random_force_N,) * 3 + (given.random_torque_N_m,) * 3
     plant = ProximityPair(
         motion,
         ca.DM(model.target.inertia_kg_m2),
-        OrbitalDisturbance(given.constant.column(), given.sine.column(), given.cosine.column(), random),
+        model.environment.disturbance(),
         RelativeSensor(
             position_error=sensors.position_deviation_m,
             attitude_error=sensors.attitude_deviation,
