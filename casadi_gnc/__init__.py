@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from casadi_gnc.errors import GncError
     from casadi_gnc.missions.flight import Flight
     from casadi_gnc.missions.flying import fly, fly_all
-    from casadi_gnc.missions.loading import load, shipped
     from casadi_gnc.missions.mission import Mission
+    from casadi_gnc.problem_files.loading import load, shipped
     from casadi_gnc.status import StepStatus
 
 __all__ = ["Flight", "GncError", "Mission", "StepStatus", "fly", "fly_all", "load", "shipped"]
@@ -31,8 +31,8 @@ _HOMES = {
     "StepStatus": "status",
     "fly": "missions.flying",
     "fly_all": "missions.flying",
-    "load": "missions.loading",
-    "shipped": "missions.loading",
+    "load": "problem_files.loading",
+    "shipped": "problem_files.loading",
 }
 
 

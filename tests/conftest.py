@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.compilers import Compiler, _probe
+from casadi_gnc.system.compilers import Compiler, _probe
 
 # Independent implementations that tests and benchmarks compare with.
 sys.path.insert(0, str(Path(__file__).parent / "oracles"))

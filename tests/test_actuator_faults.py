@@ -4,8 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc.actuator_faults import ActuatorFault, FaultSchedule
 from casadi_gnc.errors import FlightError
+from casadi_gnc.mechanics.actuator_faults import ActuatorFault, FaultSchedule
 
 ONES = ca.DM.ones(3)
 

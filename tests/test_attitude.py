@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
-from casadi_gnc import attitude
+from casadi_gnc.mechanics import attitude
 
 component = st.floats(-2, 2, allow_nan=False)
 mrps = arrays(float, 3, elements=component)

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.errors import CompilerError, NoCompilerError
+from casadi_gnc.system import assets, compilers
 
 SOURCE = "int answer(void);\nint answer(void) { return 42; }\n"
 INCLUDE = assets.folder("codegen") / "runtime"

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc import dipoles
+from casadi_gnc.mechanics import dipoles
 
 MU0 = 4e-7 * np.pi
 

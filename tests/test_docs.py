@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from casadi_gnc.missions.allocation_file import load_allocation
+from casadi_gnc.problem_files.allocation_file import load_allocation
 
 ROOT = Path(__file__).parents[1]
 PYTHON = [

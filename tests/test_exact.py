@@ -4,7 +4,7 @@ import casadi as ca
 import mpmath
 import numpy as np
 
-from casadi_gnc import exact
+from casadi_gnc.mathematics import exact
 
 mpmath.mp.dps = 60
 

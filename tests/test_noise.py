@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from casadi_gnc import assets, compilers, noise
+from casadi_gnc.mathematics import noise
+from casadi_gnc.system import assets, compilers
 
 SOURCE = """
 #include "gnc_random.h"

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.attitude import frame_rotation
-from casadi_gnc.missions.loading import read
-from casadi_gnc.rigid_body import inverse3
-from casadi_gnc.thrusters import ThrusterGeometry, corner_errors
+from casadi_gnc.mechanics.attitude import frame_rotation
+from casadi_gnc.mechanics.rigid_body import inverse3
+from casadi_gnc.mechanics.thrusters import ThrusterGeometry, corner_errors
+from casadi_gnc.problem_files.loading import read
 
 R_SC = [[0.63708, 0.63708, -0.43388], [-0.08785, 0.61925, 0.78026], [0.76577, -0.45897, 0.45048]]
 CORNERS = {  # Table 3: position of the three thrusters of each corner; z of the last corrected

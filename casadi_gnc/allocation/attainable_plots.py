@@ -14,7 +14,7 @@ import numpy as np
 from casadi_gnc.allocation.attainable_sets import AttainableSet, SetKind, attainable_sets, half_widths
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.files import write_beside
+from casadi_gnc.system.files import write_beside
 
 #: Okabe and Ito's colours, told apart with every kind of colour vision; width of the line (the outer sets are
 #: drawn wider and first, so that coinciding edges show all), strength of the filling, name.

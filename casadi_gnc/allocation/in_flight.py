@@ -9,15 +9,16 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import bounds, compilers
 from casadi_gnc.allocation.allocator import Allocator
 from casadi_gnc.allocation.answer import AllocationStatus
 from casadi_gnc.allocation.online import OnlineSolver
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import NoCompilerError
-from casadi_gnc.rigid_body import inverse3
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.mechanics.rigid_body import inverse3
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
+from casadi_gnc.system import compilers
 
 
 def pseudo_inverse(effectiveness: ca.DM) -> ca.DM:

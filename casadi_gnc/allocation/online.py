@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.system import assets, compilers
 
 #: Flags with which gcc vectorises it; the words stay the same.
 FAST = ("-O3", "-fno-math-errno", "-fno-trapping-math")

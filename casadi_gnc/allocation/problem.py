@@ -38,7 +38,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.thrusters import ThrusterGeometry, corner_errors
+from casadi_gnc.mechanics.thrusters import ThrusterGeometry, corner_errors
 
 
 @dataclass(frozen=True, eq=False)

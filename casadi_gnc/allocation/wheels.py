@@ -21,7 +21,7 @@ from scipy.linalg import null_space
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.reaction_wheels import acceleration_bounds
+from casadi_gnc.mechanics.reaction_wheels import acceleration_bounds
 
 
 @dataclass(frozen=True, eq=False)

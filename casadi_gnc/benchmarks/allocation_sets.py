@@ -12,8 +12,8 @@ from casadi_gnc.benchmarks.families import random_family
 from casadi_gnc.benchmarks.outside import Samples, boxed, read_commands, read_outside
 from casadi_gnc.benchmarks.sets import AllocationFamily, load_set
 from casadi_gnc.errors import BenchmarkError
-from casadi_gnc.missions import loading
-from casadi_gnc.missions.allocation_file import load_allocation
+from casadi_gnc.problem_files import loading
+from casadi_gnc.problem_files.allocation_file import load_allocation
 
 
 def load_families(problems: list[str], samples: int | None) -> list[Family]:

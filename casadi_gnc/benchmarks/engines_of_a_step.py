@@ -17,8 +17,8 @@ import casadi as ca
 import jinja2
 import numpy as np
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.embedded.printer import Math, Real, print_function
+from casadi_gnc.system import assets, compilers
 
 Way = Callable[[np.ndarray], np.ndarray]
 #: Flags as for flights.

@@ -12,7 +12,7 @@ import numpy as np
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.benchmarks.sets import Random
-from casadi_gnc.thrusters import corner_errors
+from casadi_gnc.mechanics.thrusters import corner_errors
 
 
 def random_family(given: Random) -> tuple[AllocationProblem, np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ _CPU = Path("/sys/devices/system/cpu/cpu0/cpufreq")
 
 def describe() -> dict[str, Any]:
     """Return processor, cores, governor, load, system, Python and compiler, as plain data."""
-    from casadi_gnc import compilers
+    from casadi_gnc.system import compilers
 
     found = compilers.available()
     return {

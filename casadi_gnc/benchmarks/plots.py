@@ -10,7 +10,7 @@ import numpy as np
 from casadi_gnc.benchmarks.results import Results
 from casadi_gnc.benchmarks.statistics import charged, performance_profile
 from casadi_gnc.benchmarks.summary import contestants_of, groups, timings
-from casadi_gnc.files import write_beside
+from casadi_gnc.system.files import write_beside
 
 #: Okabe and Ito's colours, told apart with every kind of colour vision; beyond seven the line's style changes.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")

@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from casadi_gnc.files import prepare_folder, write_beside
 from casadi_gnc.missions.flying import fly
-from casadi_gnc.missions.loading import load
+from casadi_gnc.problem_files.loading import load
+from casadi_gnc.system.files import prepare_folder, write_beside
 
 #: Samples that follow one another.
 RUN = 5

@@ -15,7 +15,7 @@ from casadi_gnc.benchmarks.markdown import as_markdown
 from casadi_gnc.benchmarks.results import Results
 from casadi_gnc.benchmarks.running import left_out
 from casadi_gnc.benchmarks.summary import COLUMNS, Overview, alike
-from casadi_gnc.files import prepare_folder, write_beside
+from casadi_gnc.system.files import prepare_folder, write_beside
 
 
 def write_report(found: Overview, folder: Path | None = None) -> list[Path]:

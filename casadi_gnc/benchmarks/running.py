@@ -22,7 +22,7 @@ from casadi_gnc.benchmarks.measuring import Mode
 from casadi_gnc.benchmarks.results import FILE, FORMAT, Results, Writer, read_results
 from casadi_gnc.benchmarks.settings import Settings
 from casadi_gnc.errors import BenchmarkError
-from casadi_gnc.files import prepare_folder, write_beside
+from casadi_gnc.system.files import prepare_folder, write_beside
 
 #: What a contest adds to the report.
 APPENDIX = "appendix.md"

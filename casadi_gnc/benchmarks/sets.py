@@ -15,8 +15,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from casadi_gnc.errors import BenchmarkError
-from casadi_gnc.missions import loading
-from casadi_gnc.missions.schema import Format, NonNegative, Part, Positive
+from casadi_gnc.problem_files import loading
+from casadi_gnc.problem_files.schema import Format, NonNegative, Part, Positive
 
 FamilyName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,40}$", description="small letters, digits and _")]
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import compilers
 from casadi_gnc.benchmarks.contest import Accuracy, Family, Judgement, digest
 from casadi_gnc.benchmarks.engines_of_a_step import Way, buffer_way, c_way, call_way, casadi_c_way, python_way
 from casadi_gnc.benchmarks.machine import version
 from casadi_gnc.errors import BenchmarkError, FlightError
-from casadi_gnc.missions.loading import load
+from casadi_gnc.problem_files.loading import load
+from casadi_gnc.system import compilers
 
 NAME = "step"
 TITLE = "One controller step"

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from casadi_gnc.benchmarks.contest import Family
+from casadi_gnc.delivery import packaging
 from casadi_gnc.embedded import targets
 from casadi_gnc.errors import GncError
-from casadi_gnc.missions import packaging
 
 #: Samples replayed; the fewest that a package takes are some more than those with bad measurements.
 STEPS = packaging.SPOILED + 40

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from casadi_gnc.missions.allocating import CaseAllocator, Tally
+    from casadi_gnc.problem_files.allocating import CaseAllocator, Tally
 
 
 class AccuracyChoice(str, Enum):
@@ -33,8 +33,8 @@ def allocate(
 ) -> None:
     """Allocate commands to actuators, each answer with its certificate."""
     from casadi_gnc.errors import AllocationError
-    from casadi_gnc.missions import allocating
-    from casadi_gnc.missions.allocation_file import load_allocation
+    from casadi_gnc.problem_files import allocating
+    from casadi_gnc.problem_files.allocation_file import load_allocation
 
     case = load_allocation(problem)
     if stream == (commands is not None):
@@ -54,8 +54,8 @@ def allocate(
 def _table(allocator: CaseAllocator, commands: Path, out: Path | None, tally: Tally) -> None:
     import csv
 
-    from casadi_gnc.files import prepare_folder, write_beside
-    from casadi_gnc.missions import allocating
+    from casadi_gnc.problem_files import allocating
+    from casadi_gnc.system.files import prepare_folder, write_beside
 
     rows, count = len(allocator.case.row_scale), allocator.case.problem.count
     wanted = allocating.read_commands(commands, rows)
@@ -76,7 +76,7 @@ def _stream(allocator: CaseAllocator, tally: Tally, *, json: bool) -> None:
     """Answer line by line, each flushed; a bad line gets an error line and the stream goes on."""
     import json as encoder
 
-    from casadi_gnc.missions import allocating
+    from casadi_gnc.problem_files import allocating
 
     rows = len(allocator.case.row_scale)
     names = ",".join(f"u{i}" for i in range(1, rows + 1))

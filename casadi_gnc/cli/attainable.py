@@ -21,8 +21,8 @@ def attainable(
     errors. The box that the file's torque_limit_N_m asks for is judged against each.
     """
     from casadi_gnc.allocation.attainable import attainable as analyse
-    from casadi_gnc.files import prepare_folder
-    from casadi_gnc.missions.allocation_file import load_allocation
+    from casadi_gnc.problem_files.allocation_file import load_allocation
+    from casadi_gnc.system.files import prepare_folder
 
     case = load_allocation(problem)
     if plot is not None:

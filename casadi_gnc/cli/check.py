@@ -19,12 +19,12 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
+    from casadi_gnc.checking import check_file
     from casadi_gnc.checks import worst
-    from casadi_gnc.missions.checking import check_file
 
     title, found = check_file(problem, scheme)
     if plot is not None:
-        from casadi_gnc.missions.checking.picture import draw
+        from casadi_gnc.reports.check_picture import draw
 
         draw(title, found, plot)
     if json:
@@ -38,7 +38,7 @@ def check(
 def _print_json(title: str, found: list[Check]) -> None:
     import json as encoder
 
-    from casadi_gnc.missions.checking import as_data
+    from casadi_gnc.checking import as_data
 
     typer.echo(encoder.dumps({"problem": title, "checks": as_data(found)}, indent=2, allow_nan=False))
 

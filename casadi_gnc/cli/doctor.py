@@ -42,9 +42,9 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] 
 
 def examine() -> dict[str, Any]:
     """Return what the doctor finds, as plain data."""
-    from casadi_gnc import compilers
     from casadi_gnc.allocation import backends
     from casadi_gnc.embedded import targets
+    from casadi_gnc.system import compilers
 
     packages, missing = {}, []
     for name in _CORE:

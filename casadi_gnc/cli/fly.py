@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from casadi_gnc.missions.flight import Flight
     from casadi_gnc.missions.mission import Metric, Mission
-    from casadi_gnc.missions.sweeping import Sweep
+    from casadi_gnc.problem_files.sweeping import Sweep
 
 
 class EngineChoice(str, Enum):
@@ -49,11 +49,11 @@ def fly(
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
     """Fly a mission and write <scheme>.npz, summary.json and pictures; of one with sweeps summary.json alone."""
-    from casadi_gnc.files import prepare_folder
     from casadi_gnc.missions import flight as results
     from casadi_gnc.missions.flying import fly as fly_one
-    from casadi_gnc.missions.loading import load
-    from casadi_gnc.missions.sweeping import load_sweeps
+    from casadi_gnc.problem_files.loading import load
+    from casadi_gnc.problem_files.sweeping import load_sweeps
+    from casadi_gnc.system.files import prepare_folder
 
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
@@ -101,7 +101,7 @@ def _fly_sweeps(
     from rich.markup import escape
     from rich.table import Table
 
-    from casadi_gnc.missions.sweeping import fly_sweep, save_sweeps
+    from casadi_gnc.problem_files.sweeping import fly_sweep, save_sweeps
 
     flown = []
     for sweep in sweeps:
@@ -130,7 +130,7 @@ def _fly_sweeps(
 
 
 def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
-    from casadi_gnc.missions import plots
+    from casadi_gnc.reports import flight_pictures as plots
 
     pictures = [plots.plot_flight(mission, flight, folder) for flight in flights]
     if len(flights) > 1:

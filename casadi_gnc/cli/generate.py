@@ -38,11 +38,11 @@ def generate(
     force: Annotated[bool, typer.Option(help="Overwrite a package whose files were edited.")] = False,
 ) -> None:
     """Write the controller as C that an embedded project takes as it is, with a flight to test it by."""
-    from casadi_gnc.missions import packaging
+    from casadi_gnc.delivery import packaging
 
     gains, boards = _words(tunable), _words(target)
     if format is FormatChoice.fmu:
-        from casadi_gnc.missions.fmu import generate_fmu
+        from casadi_gnc.delivery.fmu import generate_fmu
 
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains)
         typer.echo(f"wrote {written}")

@@ -15,7 +15,7 @@ def list_problems(context: typer.Context) -> None:
     """List the problems shipped; `copy` gives one to change."""
     if context.invoked_subcommand is not None:
         return
-    from casadi_gnc.missions.loading import read, shipped
+    from casadi_gnc.problem_files.loading import read, shipped
 
     names = shipped()
     width = max(map(len, names))
@@ -31,8 +31,8 @@ def copy(
 ) -> None:
     """Copy a shipped problem into a folder; an existing file is never overwritten."""
     from casadi_gnc.errors import ProblemError
-    from casadi_gnc.files import prepare_folder, write_beside
-    from casadi_gnc.missions.loading import read, shipped
+    from casadi_gnc.problem_files.loading import read, shipped
+    from casadi_gnc.system.files import prepare_folder, write_beside
 
     if name.removesuffix(".toml") not in shipped():
         raise ProblemError(f"no shipped problem {name!r}; there is {', '.join(shipped())}")

@@ -22,7 +22,7 @@ def reproduce(
 ) -> None:
     """Answer every claim and print verdicts; exit code 1 if a claim could not be answered."""
     from casadi_gnc import fidelity
-    from casadi_gnc.files import prepare_folder
+    from casadi_gnc.system.files import prepare_folder
 
     files = {name: fidelity.read_claims(name) for name in paper or fidelity.papers()}
     if out is not None:

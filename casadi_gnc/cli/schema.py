@@ -12,11 +12,11 @@ def schema() -> None:
     """Print the JSON Schema of a problem file."""
     from pydantic import TypeAdapter
 
+    from casadi_gnc import vehicles as crafts
     from casadi_gnc.benchmarks.sets import BenchmarkModel
     from casadi_gnc.fidelity.claims import ClaimsFile
-    from casadi_gnc.missions import crafts
-    from casadi_gnc.missions.allocation_file import AllocationModel
-    from casadi_gnc.missions.synthesis_file import SynthesisModel
+    from casadi_gnc.problem_files.allocation_file import AllocationModel
+    from casadi_gnc.problem_files.synthesis_file import SynthesisModel
 
     files: Any = AllocationModel | SynthesisModel | BenchmarkModel | ClaimsFile
     for name in crafts.names():

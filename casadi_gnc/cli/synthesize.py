@@ -14,7 +14,7 @@ def synthesize(
 ) -> None:
     """Find gains by a recipe and certify them; exit code 1 where there are none that can be used."""
     from casadi_gnc.errors import SynthesisError
-    from casadi_gnc.missions.synthesis_file import load_synthesis, synthesize
+    from casadi_gnc.problem_files.synthesis_file import load_synthesis, synthesize
 
     if backend not in (None, "clarabel", "scs", "barrier"):
         raise SynthesisError(f"no synthesis back end {backend!r}; there is clarabel, scs, barrier")

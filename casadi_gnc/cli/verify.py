@@ -17,8 +17,8 @@ def verify(
     report: Annotated[Path | None, typer.Option(help="Write an HTML report.")] = None,
 ) -> None:
     """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs."""
+    from casadi_gnc.delivery.packaging import verify as run
     from casadi_gnc.embedded import targets
-    from casadi_gnc.missions.packaging import verify as run
 
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
     if "all" in wanted:
@@ -40,7 +40,7 @@ def verify(
 
 def _write(path: Path, found: dict[str, Any]) -> None:
     from casadi_gnc.embedded.report import render_report
-    from casadi_gnc.files import prepare_folder, write_beside
+    from casadi_gnc.system.files import prepare_folder, write_beside
 
     prepare_folder(path.parent)
     write_beside(path, lambda place: place.write_text(render_report(found), encoding="utf-8"))

@@ -12,7 +12,6 @@ from typing import Any
 
 import jinja2
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.host import FLAGS
 from casadi_gnc.embedded.members import access
@@ -20,6 +19,7 @@ from casadi_gnc.embedded.package import flight_files, put
 from casadi_gnc.embedded.source import access_tunable, environment
 from casadi_gnc.errors import CompilerError, PackageError
 from casadi_gnc.signals import Layout
+from casadi_gnc.system import assets, compilers
 
 #: A date for every file of the archive: the same unit has the same bytes on another day.
 _DATE = (1980, 1, 1, 0, 0, 0)

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.embedded.targets import units
 from casadi_gnc.errors import CompilerError
+from casadi_gnc.system import assets, compilers
 
 #: -fno-math-errno: the square root is one instruction; the words stay the same.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno")

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc import assets
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.source import allocator_files, environment, render_header, render_source, runtime_files
 from casadi_gnc.errors import OutputError, PackageError
+from casadi_gnc.system import assets
 
 #: Where a package's own Makefile and CMake build; never looked at.
 BUILD = "build"

@@ -6,7 +6,7 @@ from typing import Any
 
 import jinja2
 
-from casadi_gnc import assets
+from casadi_gnc.system import assets
 
 
 def render_report(found: dict[str, Any]) -> str:

@@ -7,7 +7,6 @@ from typing import Any
 
 import jinja2
 
-from casadi_gnc import assets
 from casadi_gnc.allocation import online
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded.controller import Controller, Options
@@ -19,6 +18,7 @@ from casadi_gnc.embedded.members import (
     tunable_members,
 )
 from casadi_gnc.embedded.printer import print_function
+from casadi_gnc.system import assets
 
 #: Objects that a tape may read or write, with their C declarations ({name}: prefix of the package).
 _OBJECTS = {

@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc import assets
 from casadi_gnc.embedded import stack
 from casadi_gnc.errors import TargetError
+from casadi_gnc.system import assets
 
 #: Flags of every target; the same as on the host, with sections that the linker may drop.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-ffunction-sections", "-fdata-sections")

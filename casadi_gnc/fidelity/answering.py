@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 import casadi_gnc
-from casadi_gnc import assets, compilers
 from casadi_gnc.errors import GncError
 from casadi_gnc.fidelity.claims import ClaimModel, ClaimsFile
 from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.fidelity.verdict import Answer
-from casadi_gnc.files import write_beside
-from casadi_gnc.missions.loading import read
+from casadi_gnc.problem_files.loading import read
 from casadi_gnc.status import StepStatus
+from casadi_gnc.system import assets, compilers
+from casadi_gnc.system.files import write_beside
 
 Progress = Callable[[int, int], None]
 

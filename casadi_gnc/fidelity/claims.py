@@ -11,12 +11,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from casadi_gnc import assets
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.fidelity.computations import COMPUTATIONS
-from casadi_gnc.missions import loading
-from casadi_gnc.missions.schema import Format, MetricModel, Name, NonNegative, Part
+from casadi_gnc.problem_files import loading
+from casadi_gnc.problem_files.schema import Format, MetricModel, Name, NonNegative, Part
 from casadi_gnc.status import StepStatus
+from casadi_gnc.system import assets
 
 
 class FlightModel(Part):

@@ -13,7 +13,7 @@ import jinja2
 from casadi_gnc.fidelity.claims import ClaimsFile
 from casadi_gnc.fidelity.page import TEMPLATE
 from casadi_gnc.fidelity.verdict import Answer, Verdict
-from casadi_gnc.files import write_beside
+from casadi_gnc.system.files import write_beside
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from casadi_gnc import exact
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
+from casadi_gnc.mathematics import exact
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
 

@@ -18,8 +18,8 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.relative_motion import PairModel
-from casadi_gnc.rigid_body import inverse3
+from casadi_gnc.mechanics.relative_motion import PairModel
+from casadi_gnc.mechanics.rigid_body import inverse3
 from casadi_gnc.status import StepStatus
 
 #: Share of the speed limit that is planned with.

@@ -38,7 +38,7 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import bounds
+from casadi_gnc.mathematics import bounds
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,7 @@ from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from casadi_gnc import exact
+from casadi_gnc.mathematics import exact
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import bounds, exact
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
 from casadi_gnc.laws._law import Law, gain, gains_of, option
@@ -33,6 +32,7 @@ from casadi_gnc.laws.projection import Projection, inertia_box
 from casadi_gnc.laws.sampled_funnel import SampledFunnel
 from casadi_gnc.laws.second_order_filter import SecondOrderFilter
 from casadi_gnc.laws.tan_transform import PlainError, TanTransform
+from casadi_gnc.mathematics import bounds, exact
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

@@ -25,9 +25,9 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import attitude
-from casadi_gnc.circular_orbit import CircularOrbit
-from casadi_gnc.rigid_body import inverse3
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.circular_orbit import CircularOrbit
+from casadi_gnc.mechanics.rigid_body import inverse3
 
 
 @dataclass(frozen=True, eq=False)

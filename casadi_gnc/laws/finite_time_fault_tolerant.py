@@ -28,10 +28,11 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import attitude, bounds
 from casadi_gnc.laws._law import Law, gain
-from casadi_gnc.reaction_wheels import attitude_signals, modelled_acceleration
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.reaction_wheels import attitude_signals, modelled_acceleration
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout
 
 

@@ -23,7 +23,7 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import bounds, exact
+from casadi_gnc.mathematics import bounds, exact
 
 #: Share of the funnel's half width beside the wall in which lambda is held.
 GUARD = 1e-3

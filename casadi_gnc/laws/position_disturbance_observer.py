@@ -35,7 +35,7 @@ from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.approach import Approach, as_matrix
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.sampled_loop import refuse_long_hold
-from casadi_gnc.relative_motion import PairModel
+from casadi_gnc.mechanics.relative_motion import PairModel
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

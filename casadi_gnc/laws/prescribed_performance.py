@@ -44,7 +44,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import attitude
 from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.braking_limiter import BrakingLimiter
@@ -52,7 +51,8 @@ from casadi_gnc.laws.command_filter import CommandFilter
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.performance_funnel import PerformanceFunnel
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

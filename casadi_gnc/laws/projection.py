@@ -14,8 +14,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import bounds, exact
 from casadi_gnc.errors import LawError
+from casadi_gnc.mathematics import bounds, exact
 
 #: Share of the box beside each wall over which an outward rate fades.
 FADE = 0.1

@@ -22,7 +22,7 @@ import numpy as np
 
 from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws.proximity_tracking import ProximityTracking
-from casadi_gnc.proximity_motion import ProximityMotion
+from casadi_gnc.mechanics.proximity_motion import ProximityMotion
 
 
 def coupling_condition(law: ProximityTracking, motion: ProximityMotion, target_inertia: Any, target_rate: Any) -> Check:

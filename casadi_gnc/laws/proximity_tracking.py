@@ -43,12 +43,12 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import attitude
 from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
-from casadi_gnc.proximity_motion import ProximityMotion
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.proximity_motion import ProximityMotion
 from casadi_gnc.signals import Layout, Signal
 
 #: Square of the MRPs below which the other set, beyond 1000, says no more than "a full turn".

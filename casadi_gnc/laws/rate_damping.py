@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from casadi_gnc.laws._law import Law, gain
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from casadi_gnc.errors import LawError
 from casadi_gnc.laws._law import Law
 from casadi_gnc.laws.sampling import advance, phi1
-from casadi_gnc.relative_motion import PairModel
+from casadi_gnc.mechanics.relative_motion import PairModel
 
 #: Shortest sample period [s] that the search considers.
 SHORTEST = 1e-4

@@ -19,9 +19,9 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import exact
-from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.laws._law import Law
+from casadi_gnc.mathematics import exact
+from casadi_gnc.mathematics.integrators import runge_kutta
 
 
 def advance(law: Law, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any:

@@ -49,14 +49,14 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import attitude
 from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.command_filter import CommandFilter
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
-from casadi_gnc.reaction_wheels import attitude_signals, modelled_acceleration
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.reaction_wheels import attitude_signals, modelled_acceleration
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 
 

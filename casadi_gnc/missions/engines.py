@@ -14,13 +14,13 @@ import casadi as ca
 import jinja2
 import numpy as np
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.allocation import Allocate, OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
+from casadi_gnc.mathematics.noise import uniform_count, uniforms
 from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.missions.tapes import Tapes
-from casadi_gnc.noise import uniform_count, uniforms
 from casadi_gnc.status import StepStatus
+from casadi_gnc.system import assets, compilers
 
 
 @dataclass(eq=False)

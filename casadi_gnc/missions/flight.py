@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import FlightError
-from casadi_gnc.files import write_beside
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
+from casadi_gnc.system.files import write_beside
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import bounds
+from casadi_gnc.mathematics import bounds
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

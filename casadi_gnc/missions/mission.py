@@ -14,7 +14,7 @@ import casadi as ca
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.plants import Plant
+from casadi_gnc.missions.plant import Plant
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

@@ -34,10 +34,10 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc import bounds, noise
 from casadi_gnc.errors import FlightError
-from casadi_gnc.integrators import join, runge_kutta
 from casadi_gnc.laws import advance
+from casadi_gnc.mathematics import bounds, noise
+from casadi_gnc.mathematics.integrators import join, runge_kutta
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.mission import Funnel, Mission, Scheme
 from casadi_gnc.signals import Layout, Signal

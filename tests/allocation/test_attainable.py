@@ -18,10 +18,10 @@ from casadi_gnc.allocation.attainable_plots import outline, plot_slices
 from casadi_gnc.allocation.attainable_sets import SetKind, attainable_sets
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.allocation.zonotope import Zonotope
-from casadi_gnc.attitude import frame_rotation
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.missions.loading import read
-from casadi_gnc.thrusters import ThrusterGeometry
+from casadi_gnc.mechanics.attitude import frame_rotation
+from casadi_gnc.mechanics.thrusters import ThrusterGeometry
+from casadi_gnc.problem_files.loading import read
 
 #: Both ways end at the feasibility tolerance of the linear program, 1e-10 of the full effort.
 CLOSE = {"rtol": 1e-8, "atol": 1e-9}

@@ -8,8 +8,8 @@ import pytest
 
 from casadi_gnc.allocation import AllocationProblem, Allocator, solve
 from casadi_gnc.allocation.faults import with_faults, worst_alignment
-from casadi_gnc.attitude import frame_rotation
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mechanics.attitude import frame_rotation
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ def test_update_keeps_the_last_forces(problem, rng):
 
 def test_update_keeps_the_warm_start_of_the_on_board_solver(rng):
     """New weights: the solver goes on from the last answer instead of starting cold, and is certified."""
-    from casadi_gnc.missions.allocation_file import load_allocation
+    from casadi_gnc.problem_files.allocation_file import load_allocation
 
     problem = load_allocation("huang2020/allocation").problem
     warm, cold = Allocator(problem, "online", accuracy="high"), Allocator(problem, "online", accuracy="high")
@@ -119,7 +119,7 @@ def test_update_keeps_the_warm_start_of_the_on_board_solver(rng):
 
 
 def test_dead_actuators_of_the_truth_do_not_follow():
-    from casadi_gnc.missions.allocation_file import load_allocation
+    from casadi_gnc.problem_files.allocation_file import load_allocation
 
     problem = load_allocation("huang2020/allocation").problem
     assert worst_alignment(problem).share > 0.9
@@ -128,7 +128,7 @@ def test_dead_actuators_of_the_truth_do_not_follow():
 
 def test_arrays_that_the_c_would_read_past_are_refused():
     from casadi_gnc.allocation.online import OnlineSolver
-    from casadi_gnc.missions.allocation_file import load_allocation
+    from casadi_gnc.problem_files.allocation_file import load_allocation
 
     solver = OnlineSolver(load_allocation("huang2020/allocation").problem)
     lower, upper = np.zeros(12), np.full(12, 1e-3)

@@ -8,7 +8,7 @@ import pytest
 from casadi_gnc.allocation import AllocationProblem, AllocationStatus, Allocator, Saturation, solve
 from casadi_gnc.allocation.modes import along_direction, axis_scale, by_priority, largest_scale, with_minimum_impulse
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.missions.allocation_file import load_allocation
+from casadi_gnc.problem_files.allocation_file import load_allocation
 
 
 @pytest.fixture(scope="module")

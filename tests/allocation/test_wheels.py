@@ -47,7 +47,7 @@ def test_desaturation_makes_no_torque_and_slows_the_null_space(wheels):
 
 
 def test_thrusters_and_wheels_share_a_command(wheels, rng):
-    from casadi_gnc.missions.allocation_file import load_allocation
+    from casadi_gnc.problem_files.allocation_file import load_allocation
 
     thrusters = load_allocation("huang2020/allocation").problem
     both = combine(thrusters, wheels.problem(accuracy_weight=thrusters.accuracy_weight))

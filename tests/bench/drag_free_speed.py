@@ -17,11 +17,12 @@ import casadi as ca
 import numpy as np
 
 import casadi_gnc
-from casadi_gnc import bounds, compilers
-from casadi_gnc.integrators import runge_kutta
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.system import compilers
 
 MISSION, SCHEME = casadi_gnc.load("tao2019/case1"), "funnels"
 SAMPLES, STEP = MISSION.timing.samples, MISSION.timing.sample_period

@@ -19,10 +19,10 @@ from typing import Literal
 import numpy as np
 
 import casadi_gnc
-from casadi_gnc import compilers
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.system import compilers
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "oracles"))
 oracle = import_module("proximity_numpy")

@@ -16,7 +16,7 @@ import warnings
 
 import numpy as np
 
-from casadi_gnc.missions.synthesis_file import load_synthesis
+from casadi_gnc.problem_files.synthesis_file import load_synthesis
 from casadi_gnc.synthesis.recipes.intermediate_observer import _between, _pose, uncoupled
 
 A, B, VARPI, S, MARGIN = np.array([[0, 1.0], [0, 0]]), np.array([[0], [0.05]]), 200.0, 0.3, 1e-6

@@ -11,7 +11,7 @@ import time
 import numpy as np
 import pytest
 
-from casadi_gnc.missions.allocation_file import load_allocation
+from casadi_gnc.problem_files.allocation_file import load_allocation
 
 PROGRAM = [sys.executable, "-m", "casadi_gnc.cli.main", "allocate"]
 CASE = "huang2020/allocation"
@@ -167,7 +167,7 @@ def test_bad_input_is_told(commands, tmp_path):
     ],
 )  # fmt: skip
 def test_bad_files_are_told(tmp_path, change, message):
-    from casadi_gnc.missions.loading import read
+    from casadi_gnc.problem_files.loading import read
 
     _, text, _ = read(CASE)
     path = tmp_path / "bad.toml"
@@ -177,7 +177,7 @@ def test_bad_files_are_told(tmp_path, change, message):
 
 
 def test_options_of_the_file_are_used(tmp_path):
-    from casadi_gnc.missions.loading import read
+    from casadi_gnc.problem_files.loading import read
 
     _, text, _ = read(CASE)
     path = tmp_path / "options.toml"
@@ -219,7 +219,7 @@ def test_table_with_byte_order_mark_and_blank_lines(tmp_path):
 
 
 def test_priorities_do_not_change_what_can_be_attained(tmp_path):
-    from casadi_gnc.missions.loading import read
+    from casadi_gnc.problem_files.loading import read
 
     _, text, _ = read(CASE)
     path = tmp_path / "priorities.toml"

@@ -98,7 +98,7 @@ def test_fly_options(problem, tmp_path, options):
 def test_schema_accepts_the_shipped_problems():
     import tomllib
 
-    from casadi_gnc.missions.loading import read
+    from casadi_gnc.problem_files.loading import read
 
     schema = json.loads(run("schema").stdout)
     assert schema["$schema"].endswith("2020-12/schema")
@@ -225,6 +225,6 @@ def test_long_flight_shows_progress_on_a_terminal(tmp_path):
 
 
 def casadi_problem_text() -> str:
-    from casadi_gnc.missions.loading import read
+    from casadi_gnc.problem_files.loading import read
 
     return read("huang2020/detumble")[1]

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from casadi_gnc import assets
+from casadi_gnc.system import assets
 
 CASE = (assets.folder("problems") / "tao2019" / "case1.toml").read_text(encoding="utf-8")
 SWEEP = """

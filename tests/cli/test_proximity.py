@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from casadi_gnc.missions.loading import read
+from casadi_gnc.problem_files.loading import read
 
 _, PRINTED, _ = read("sun2018/as_printed")
 _, LOW, _ = read("sun2018/circular_orbit")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from casadi_gnc.missions.loading import read
+from casadi_gnc.problem_files.loading import read
 
 PROGRAM = [sys.executable, "-m", "casadi_gnc.cli.main", "synthesize"]
 

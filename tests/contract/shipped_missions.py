@@ -4,8 +4,8 @@ from functools import cache
 
 import casadi_gnc
 from casadi_gnc.laws import LAWS, Law
-from casadi_gnc.missions.loading import read, shipped
 from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.problem_files.loading import read, shipped
 
 
 @cache

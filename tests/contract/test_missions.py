@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from shipped_missions import missions
 
+from casadi_gnc.checking import check
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.checking import check
 from casadi_gnc.missions.engines import CompiledEngine, VirtualMachineEngine
 from casadi_gnc.missions.flying import begin
 

@@ -8,13 +8,13 @@ import pytest
 from packages import copied, made, run
 
 import casadi_gnc
+from casadi_gnc.delivery.describing import describe
+from casadi_gnc.delivery.vectors import fly_package, sampled
 from casadi_gnc.embedded import compare, package
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.machine import Machine
-from casadi_gnc.missions.loading import read, shipped
-from casadi_gnc.missions.package import describe
-from casadi_gnc.missions.package_flight import fly_package, sampled
+from casadi_gnc.problem_files.loading import read, shipped
 
 STRICT = ("-O1", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-pedantic", "-Werror")
 STEPS, SPOILED = 60, 12

@@ -5,10 +5,10 @@ import subprocess
 import pytest
 
 import casadi_gnc
-from casadi_gnc import assets
 from casadi_gnc.allocation import online
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import flight_source
+from casadi_gnc.system import assets
 
 STRICT = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wmissing-prototypes", "-pedantic", "-Werror"]
 FLIGHTS = [

@@ -12,10 +12,10 @@ from fmpy.validation import validate_fmu
 from packages import STRICT, made, run
 
 import casadi_gnc
+from casadi_gnc.delivery.fmu import generate_fmu
+from casadi_gnc.delivery.packaging import read_vectors
 from casadi_gnc.embedded import compare
 from casadi_gnc.errors import CompilerError, OutputError
-from casadi_gnc.missions.fmu import generate_fmu
-from casadi_gnc.missions.packaging import read_vectors
 
 CASES = [
     ("huang2020/slew", "funnel_pinv", "float64", ()),

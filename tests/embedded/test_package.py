@@ -9,8 +9,8 @@ import pytest
 from packages import C99, STRICT, copied, made, run, units
 
 import casadi_gnc
+from casadi_gnc.delivery.packaging import read_vectors
 from casadi_gnc.embedded import compare
-from casadi_gnc.missions.packaging import read_vectors
 
 SLEW = ("huang2020/slew", "funnel_pinv")
 ROBUST = ("huang2020/slew", "funnel_robust")
@@ -127,7 +127,7 @@ def test_readme_tells_how_to_call_it(tmp_path):
 
 AGAIN = """
 import sys
-from casadi_gnc.missions.packaging import generate
+from casadi_gnc.delivery.packaging import generate
 generate("huang2020/slew", __import__("pathlib").Path(sys.argv[1]), scheme="funnel_robust", tunable=["rate_gain"])
 """
 
@@ -146,7 +146,7 @@ def test_the_same_bytes_on_another_day_and_another_blas(tmp_path):
 
 
 def test_one_gain_changes_only_its_constants(tmp_path):
-    source = (tmp_path / "slew.toml", casadi_gnc.assets.folder("problems") / "huang2020" / "slew.toml")
+    source = (tmp_path / "slew.toml", casadi_gnc.system.assets.folder("problems") / "huang2020" / "slew.toml")
     source[0].write_text(source[1].read_text().replace("rate_gain = 2.0", "rate_gain = 2.01"))
     lines = []
     for problem in (source[0], source[1]):
@@ -216,8 +216,8 @@ def test_tunable_gains_stay_variables(tmp_path):
     assert values["unconfigured hash"] == values["default hash"]
     assert values["refused hash"] == values["changed hash"] != values["default hash"]
     # The same measurements through CasADi's machine, with the gain folded.
+    from casadi_gnc.delivery.describing import describe
     from casadi_gnc.embedded.machine import Machine
-    from casadi_gnc.missions.package import describe
 
     mission = casadi_gnc.load("huang2020/slew").with_scheme("funnel_pinv", rate_gain=2.5)
     inputs, _ = read_vectors(folder, "float64")

@@ -8,13 +8,13 @@ import pytest
 from packages import copied, made
 
 import casadi_gnc
+from casadi_gnc.delivery import packaging
+from casadi_gnc.delivery.describing import describe
+from casadi_gnc.delivery.packaging import generate, read_vectors, verify
 from casadi_gnc.embedded import package
 from casadi_gnc.embedded.names import check_name
 from casadi_gnc.errors import CompilerError, OutputError, PackageError, PrinterError, TargetError
 from casadi_gnc.laws import LAWS
-from casadi_gnc.missions import packaging
-from casadi_gnc.missions.package import describe
-from casadi_gnc.missions.packaging import generate, read_vectors, verify
 
 PLAIN = ("huang2020/slew", "pd_pinv")
 
@@ -71,7 +71,7 @@ def test_options_that_are_refused(options, error, reason, tmp_path):
 
 def test_scheme_that_cannot_fly(tmp_path):
     problem = tmp_path / "slew.toml"
-    text = (casadi_gnc.assets.folder("problems") / "huang2020" / "slew.toml").read_text()
+    text = (casadi_gnc.system.assets.folder("problems") / "huang2020" / "slew.toml").read_text()
     problem.write_text(text.replace('method = "robust"', 'method = "robust", backend = "clarabel"'))
     with pytest.raises(PackageError, match="by a solver that does not fly"):
         generate(problem, tmp_path / "out", scheme="funnel_robust")

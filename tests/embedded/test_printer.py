@@ -6,9 +6,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc import assets, compilers
 from casadi_gnc.embedded.printer import c_constant, print_function
 from casadi_gnc.errors import PrinterError
+from casadi_gnc.system import assets, compilers
 
 HEADER = "#include <math.h>\ntypedef double gnc_real;\n"
 

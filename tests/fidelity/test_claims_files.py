@@ -111,7 +111,7 @@ def test_a_computation_that_breaks_is_a_row(tmp_path):
 
 def test_a_changed_problem_file_is_flown_again(tmp_path):
     """The cache knows a user's own problem file by its content."""
-    from casadi_gnc import assets
+    from casadi_gnc.system import assets
 
     problem = tmp_path / "mine.toml"
     text = (assets.folder("problems") / "sun2018" / "circular_orbit.toml").read_text()

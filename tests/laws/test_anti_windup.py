@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from casadi_gnc.laws import LAWS, Detumble, PerformanceFunnel, PrescribedPerformance
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics.rigid_body import RigidBody
 
 BODY = RigidBody(ca.DM(np.diag([0.5, 1.2, 1.3])))
 GAINS = {"compensator_gain": 1.0, "compensator_decay": 0.5, "observer_gain": 1.0, "rate_gain": 0.4}

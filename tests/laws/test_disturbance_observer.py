@@ -4,8 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc import exact
 from casadi_gnc.laws import DisturbanceObserver
+from casadi_gnc.mathematics import exact
 
 KNOWN, DISTURBANCE, HOLD = 0.3, -0.7, 0.1
 

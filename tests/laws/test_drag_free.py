@@ -9,10 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from casadi_gnc import attitude, bounds
-from casadi_gnc.circular_orbit import EARTH_RADIUS, CircularOrbit
 from casadi_gnc.errors import LawError
-from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.laws import PerformanceFunnel
 from casadi_gnc.laws.drag_free import DragFree
 from casadi_gnc.laws.drag_free_motions import Satellite, inertia_of
@@ -20,10 +17,14 @@ from casadi_gnc.laws.projection import Projection, inertia_box
 from casadi_gnc.laws.sampling import advance
 from casadi_gnc.laws.second_order_filter import SecondOrderFilter
 from casadi_gnc.laws.tan_transform import TanTransform
-from casadi_gnc.plants import DragFreePair
-from casadi_gnc.plants.proximity_pair import OrbitalDisturbance
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.circular_orbit import EARTH_RADIUS, CircularOrbit
+from casadi_gnc.mechanics.disturbances import OrbitalDisturbance
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.status import StepStatus
+from casadi_gnc.vehicles.drag_free_pair.plant import DragFreePair
 
 ORBIT = CircularOrbit(EARTH_RADIUS + 260e3)
 MASS, INERTIA = 20.0, ca.DM([[20, 0.1, 0.2], [0.1, 20, 0.3], [0.2, 0.3, 20]])

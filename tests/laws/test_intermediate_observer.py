@@ -12,7 +12,7 @@ from casadi_gnc.laws.approach import Approach
 from casadi_gnc.laws.intermediate_observer import IntermediateObserver
 from casadi_gnc.laws.sampled_loop import longest_hold, loop_matrix, spectral_radius
 from casadi_gnc.laws.sampling import advance
-from casadi_gnc.relative_motion import PairModel
+from casadi_gnc.mechanics.relative_motion import PairModel
 from casadi_gnc.status import StepStatus
 
 N0, M0, VARPI = 6.3135e-4, 20.0, 200.0

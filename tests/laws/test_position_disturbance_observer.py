@@ -10,7 +10,7 @@ from casadi_gnc.errors import LawError
 from casadi_gnc.laws.position_disturbance_observer import PositionDisturbanceObserver
 from casadi_gnc.laws.sampled_loop import longest_hold, spectral_radius
 from casadi_gnc.laws.sampling import advance
-from casadi_gnc.relative_motion import PairModel
+from casadi_gnc.mechanics.relative_motion import PairModel
 
 M0, GAIN = 20.0, 2519.2
 BODY, TRUTH = PairModel(M0, 6.3135e-4), PairModel(4000 / 140, 6.3135e-4)

@@ -6,12 +6,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc import assets, attitude, compilers
 from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.laws import advance
 from casadi_gnc.laws.proximity_tracking import ProximityTracking
-from casadi_gnc.proximity_motion import ProximityMotion
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.proximity_motion import ProximityMotion
+from casadi_gnc.mechanics.rigid_body import RigidBody
+from casadi_gnc.system import assets, compilers
 
 MU, POINT, M0 = 3.986e14, np.array([0.0, 5.0, 0.0]), 0.8 * 58.2
 J0 = 0.8 * np.array([[598.3, -22.5, -51.5], [-22.5, 424.4, -27.0], [-51.5, -27.0, 263.6]])

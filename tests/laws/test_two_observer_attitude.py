@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import wheels_numpy as oracle
 
-from casadi_gnc import attitude
-from casadi_gnc import reaction_wheels as wheels
 from casadi_gnc.laws import advance
 from casadi_gnc.laws.finite_time_fault_tolerant import FiniteTimeFaultTolerant
 from casadi_gnc.laws.two_observer_attitude import TwoObserverAttitude
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics import reaction_wheels as wheels
+from casadi_gnc.mechanics.rigid_body import RigidBody
 
 C0 = oracle.R_PRINTED @ (oracle.C_BAR - 2.0)
 BODY = wheels.Gyrostat(ca.DM(oracle.J0), orbit_rate=oracle.W0, wheels=wheels.WheelArray(ca.DM(C0), oracle.JW))

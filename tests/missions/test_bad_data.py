@@ -108,7 +108,7 @@ def test_rate_limit_is_kept_step_by_step(detumble):
 
 
 def test_true_centre_of_mass_changes_the_truth_only(tmp_path):
-    from casadi_gnc.missions.loading import read
+    from casadi_gnc.problem_files.loading import read
 
     _, text, _ = read("huang2020/detumble")
     path = tmp_path / "moved.toml"

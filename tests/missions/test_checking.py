@@ -14,15 +14,15 @@ from scipy import signal
 
 import casadi_gnc
 from casadi_gnc.allocation import Direct
+from casadi_gnc.checking import authority, check, funnels, geometry, noise, sampling
+from casadi_gnc.checking.linear import LinearLoop, spectral_radius
 from casadi_gnc.checks import Check, worst
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.missions.building import build
-from casadi_gnc.missions.checking import authority, check, funnels, geometry, noise, sampling
-from casadi_gnc.missions.checking.linear import LinearLoop, spectral_radius
-from casadi_gnc.missions.loading import check as validate
-from casadi_gnc.missions.loading import read
 from casadi_gnc.missions.mission import Actuation, Funnel, Mission, Scheme, Timing
-from casadi_gnc.plants import Plant
+from casadi_gnc.missions.plant import Plant
+from casadi_gnc.problem_files.building import build
+from casadi_gnc.problem_files.loading import check as validate
+from casadi_gnc.problem_files.loading import read
 from casadi_gnc.signals import Layout, Signal
 
 TURNED = ca.DM([[1.0, -1.0], [1.0, 1.0]]) / 2**0.5

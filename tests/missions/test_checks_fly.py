@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.missions.checking import check
+from casadi_gnc.checking import check
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.status import StepStatus
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.missions.building import build
-from casadi_gnc.missions.loading import check, read
+from casadi_gnc.problem_files.building import build
+from casadi_gnc.problem_files.loading import check, read
 from casadi_gnc.status import StepStatus
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import LawError, ProblemError
-from casadi_gnc.missions.building import build
-from casadi_gnc.missions.loading import check, read
+from casadi_gnc.problem_files.building import build
+from casadi_gnc.problem_files.loading import check, read
 from casadi_gnc.status import StepStatus
 
 #: Where a printed number was reproduced, it is to be met this closely.

@@ -9,8 +9,8 @@ import pytest
 import casadi_gnc
 from casadi_gnc.errors import LawError
 from casadi_gnc.laws.sampled_funnel import SampledFunnel
-from casadi_gnc.missions.sweeping import fly_sweep, load_sweeps
-from casadi_gnc.plants.proximity_pair import OrbitalDisturbance
+from casadi_gnc.mechanics.disturbances import OrbitalDisturbance
+from casadi_gnc.problem_files.sweeping import fly_sweep, load_sweeps
 from casadi_gnc.status import StepStatus
 
 

@@ -6,10 +6,10 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import ProblemError
-from casadi_gnc.missions import toml_place
-from casadi_gnc.missions.allocation_file import load_allocation
-from casadi_gnc.missions.loading import read, shipped
-from casadi_gnc.missions.synthesis_file import load_synthesis
+from casadi_gnc.problem_files import toml_place
+from casadi_gnc.problem_files.allocation_file import load_allocation
+from casadi_gnc.problem_files.loading import read, shipped
+from casadi_gnc.problem_files.synthesis_file import load_synthesis
 
 _, GOOD, _ = read("huang2020/detumble")
 _, SLEW, _ = read("huang2020/slew")

@@ -14,7 +14,7 @@ import casadi_gnc
 from casadi_gnc.allocation import Direct
 from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.missions.mission import Actuation, Funnel, Metric, Mission, Noise, Scheme, Timing
-from casadi_gnc.plants import Plant
+from casadi_gnc.missions.plant import Plant
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

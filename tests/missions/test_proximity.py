@@ -9,10 +9,10 @@ import proximity_numpy as oracle
 import pytest
 
 import casadi_gnc
-from casadi_gnc.missions import checking
-from casadi_gnc.missions.building import build
-from casadi_gnc.missions.loading import check, read
-from casadi_gnc.noise import normals, uniform_count, uniforms
+from casadi_gnc import checking
+from casadi_gnc.mathematics.noise import normals, uniform_count, uniforms
+from casadi_gnc.problem_files.building import build
+from casadi_gnc.problem_files.loading import check, read
 from casadi_gnc.status import StepStatus
 
 

@@ -6,7 +6,7 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import ProblemError
-from casadi_gnc.missions.loading import read
+from casadi_gnc.problem_files.loading import read
 
 _, GOOD, _ = read("sun2018/circular_orbit")
 J = "inertia_kg_m2 = [[598.3, -22.5, -51.5]"

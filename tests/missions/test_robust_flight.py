@@ -68,7 +68,7 @@ def test_second_flight_repeats_the_first():
 
 
 def test_without_a_compiler_the_cone_solver_allocates(monkeypatch):
-    from casadi_gnc import compilers
+    from casadi_gnc.system import compilers
 
     def none():
         raise NoCompilerError("no C compiler found")

@@ -10,12 +10,12 @@ import pytest
 import wheels_numpy as oracle
 
 import casadi_gnc
-from casadi_gnc import reaction_wheels
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults, worst_alignment
-from casadi_gnc.missions.building import build
-from casadi_gnc.missions.loading import check, read
-from casadi_gnc.noise import uniforms
+from casadi_gnc.mathematics.noise import uniforms
+from casadi_gnc.mechanics import reaction_wheels
+from casadi_gnc.problem_files.building import build
+from casadi_gnc.problem_files.loading import check, read
 from casadi_gnc.status import StepStatus
 
 #: A scheme or more of every mission: all laws, both allocations, both modes.

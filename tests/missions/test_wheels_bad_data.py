@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import casadi_gnc
-from casadi_gnc.missions.loading import read
+from casadi_gnc.problem_files.loading import read
 
 _, NOMINAL, _ = read("huang2019/nominal")
 _, FREE, _ = read("huang2019/free_axes")

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc import compilers
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.system import compilers
 
 FLIGHTS = [
     ("huang2020/detumble", "damping_pinv"),

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from casadi_gnc.allocation import AllocationProblem
-from casadi_gnc.attitude import frame_rotation
-from casadi_gnc.missions.loading import read
-from casadi_gnc.thrusters import ThrusterGeometry, corner_errors
+from casadi_gnc.mechanics.attitude import frame_rotation
+from casadi_gnc.mechanics.thrusters import ThrusterGeometry, corner_errors
+from casadi_gnc.problem_files.loading import read
 
 MAX_FORCE = 3.75e-3  # N, Table 2
 COMMAND = np.array([4e-4, -3e-4, 2e-4])  # N m, about what the thrusters can make

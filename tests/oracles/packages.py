@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.embedded import targets
-from casadi_gnc.missions.packaging import generate
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-pedantic", "-Werror"]
 C99 = ["-std=c99", "-Wmissing-prototypes", "-ffp-contract=off", "-fno-math-errno"]

@@ -3,10 +3,11 @@
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import attitude
-from casadi_gnc.integrators import runge_kutta
-from casadi_gnc.plants import BodyPart, CombinedSpacecraft, Harmonics, compose_inertia
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.disturbances import Harmonics
+from casadi_gnc.mechanics.rigid_body import RigidBody
+from casadi_gnc.vehicles.combined_spacecraft.plant import BodyPart, CombinedSpacecraft, compose_inertia
 
 INERTIA = np.array([[0.54, 0.06, 0.04], [0.06, 1.33, -0.07], [0.04, -0.07, 1.42]])
 START = np.array([0.1, -0.2, 0.05, 0.45, 0.52, 0.55])

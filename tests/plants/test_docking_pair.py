@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from casadi_gnc import dipoles
-from casadi_gnc.dipoles import TargetDipole
-from casadi_gnc.integrators import runge_kutta
-from casadi_gnc.plants.docking_pair import DockingPair, FaultPiece, FaultProfile, MeasurementNoise
-from casadi_gnc.plants.environment import Harmonics
-from casadi_gnc.relative_motion import EllipticOrbit, PairModel
+from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mechanics import dipoles
+from casadi_gnc.mechanics.dipoles import TargetDipole
+from casadi_gnc.mechanics.disturbances import Harmonics
+from casadi_gnc.mechanics.relative_motion import EllipticOrbit, PairModel
+from casadi_gnc.vehicles.docking_pair.plant import DockingPair, FaultPiece, FaultProfile, MeasurementNoise
 
 MU, A, E = 3.986e14, 1e7, 0.15
 ORBIT = EllipticOrbit(A, E, MU)

@@ -10,13 +10,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from casadi_gnc import assets, attitude, compilers
-from casadi_gnc.circular_orbit import EARTH_MU, EARTH_RADIUS, CircularOrbit
 from casadi_gnc.embedded.printer import print_function
-from casadi_gnc.integrators import runge_kutta
-from casadi_gnc.plants import DragFreePair
-from casadi_gnc.plants.proximity_pair import OrbitalDisturbance
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.circular_orbit import EARTH_MU, EARTH_RADIUS, CircularOrbit
+from casadi_gnc.mechanics.disturbances import OrbitalDisturbance
+from casadi_gnc.mechanics.rigid_body import RigidBody
+from casadi_gnc.system import assets, compilers
+from casadi_gnc.vehicles.drag_free_pair.plant import DragFreePair
 
 ORBIT = CircularOrbit(EARTH_RADIUS + 260e3)
 MASS, INERTIA = 20.0, np.array([[20, 0.1, 0.2], [0.1, 18, 0.3], [0.2, 0.3, 25]])

@@ -6,13 +6,14 @@ import mpmath
 import numpy as np
 import pytest
 
-from casadi_gnc import attitude
-from casadi_gnc.integrators import runge_kutta
 from casadi_gnc.laws.proximity_tracking import ProximityTracking
-from casadi_gnc.plants.proximity_pair import OrbitalDisturbance, ProximityPair, RelativeSensor
-from casadi_gnc.proximity_motion import ProximityMotion
-from casadi_gnc.rigid_body import RigidBody
+from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.disturbances import OrbitalDisturbance
+from casadi_gnc.mechanics.proximity_motion import ProximityMotion
+from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.status import StepStatus
+from casadi_gnc.vehicles.proximity_pair.plant import ProximityPair, RelativeSensor
 
 MASS, POINT, MU = 58.2, [0.0, 5.0, 0.0], 3.986e14
 INERTIA = np.array([[598.3, -22.5, -51.5], [-22.5, 424.4, -27.0], [-51.5, -27.0, 263.6]])

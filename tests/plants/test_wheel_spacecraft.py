@@ -6,12 +6,12 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from casadi_gnc import reaction_wheels as wheels
-from casadi_gnc.actuator_faults import ActuatorFault, FaultSchedule
-from casadi_gnc.attitude import frame_rotation
-from casadi_gnc.integrators import runge_kutta
-from casadi_gnc.plants import Harmonics
-from casadi_gnc.plants.wheel_spacecraft import SensorError, WheelSpacecraft
+from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mechanics import reaction_wheels as wheels
+from casadi_gnc.mechanics.actuator_faults import ActuatorFault, FaultSchedule
+from casadi_gnc.mechanics.attitude import frame_rotation
+from casadi_gnc.mechanics.disturbances import Harmonics
+from casadi_gnc.vehicles.wheel_spacecraft.plant import SensorError, WheelSpacecraft
 
 J = np.array([[12.0, 0.4, -0.3], [0.4, 14.0, 0.2], [-0.3, 0.2, 22.0]])
 MOUNTED = np.column_stack([np.eye(3), np.full(3, 3**-0.5)])

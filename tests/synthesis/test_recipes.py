@@ -5,7 +5,7 @@ import pytest
 from riccati_equations import riccati, smallest_gamma
 
 from casadi_gnc.errors import SynthesisError
-from casadi_gnc.missions.synthesis_file import load_synthesis
+from casadi_gnc.problem_files.synthesis_file import load_synthesis
 from casadi_gnc.synthesis import (
     GainStatus,
     LmiStatus,

@@ -9,13 +9,13 @@ from packages import copied, made, need_target
 
 import casadi_gnc
 from casadi_gnc.allocation.in_flight import Direct
+from casadi_gnc.delivery.describing import describe
+from casadi_gnc.delivery.packaging import read_vectors
+from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import package, targets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.errors import TargetError
-from casadi_gnc.missions.package import describe
-from casadi_gnc.missions.package_flight import fly_package
-from casadi_gnc.missions.packaging import read_vectors
 
 #: One mission of each paper, by the scheme that is its own.
 MISSIONS = [

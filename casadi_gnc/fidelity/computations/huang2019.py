@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 import casadi_gnc
-from casadi_gnc.actuator_faults import ActuatorFault
 from casadi_gnc.allocation import AllocationProblem, solve
 from casadi_gnc.allocation.attainable import attainable
+from casadi_gnc.mechanics.actuator_faults import ActuatorFault
+from casadi_gnc.mechanics.reaction_wheels import axes_as_points, corner_shifts
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.reaction_wheels import axes_as_points, corner_shifts
 from casadi_gnc.synthesis import Lmis, block_matrix
 
 #: R_sc, Cbar and r_c0 as printed in section IV; entry (2,1) of R_sc is a misprint.

@@ -9,13 +9,13 @@ import casadi as ca
 import numpy as np
 
 import casadi_gnc
-from casadi_gnc import attitude
 from casadi_gnc.allocation import AllocationProblem, solve
 from casadi_gnc.allocation.attainable import attainable
 from casadi_gnc.errors import ProblemError
+from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.thrusters import ThrusterGeometry
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.plants import BodyPart, compose_inertia
-from casadi_gnc.thrusters import ThrusterGeometry
+from casadi_gnc.vehicles.combined_spacecraft.plant import BodyPart, compose_inertia
 
 Rows = list[list[float]]
 

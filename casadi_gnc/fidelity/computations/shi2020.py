@@ -14,7 +14,7 @@ import casadi_gnc
 from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.metrics import settled
-from casadi_gnc.missions.synthesis_file import load_synthesis
+from casadi_gnc.problem_files.synthesis_file import load_synthesis
 from casadi_gnc.synthesis import Lmis, LmiStatus, Norm, h_infinity_norm, peak_command, poles, stable_ratios
 from casadi_gnc.synthesis.analysis import gain_at
 from casadi_gnc.synthesis.recipes.intermediate_observer import by_mass_ratio, closed_loop

@@ -16,10 +16,10 @@ import casadi_gnc
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws.proximity_conditions import coupling_condition
+from casadi_gnc.mathematics.noise import normals, uniform_count, uniforms
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.metrics import settled
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.noise import normals, uniform_count, uniforms
 
 _PRINTED, _COMPARISON = "sun2018/as_printed", "sun2018/without_observer"
 #: The last minute of the flights [s]: the paper's "steady state".

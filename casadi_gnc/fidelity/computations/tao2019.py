@@ -11,8 +11,8 @@ import casadi as ca
 import numpy as np
 
 import casadi_gnc
+from casadi_gnc.checking.funnels import needed_share
 from casadi_gnc.laws.drag_free import PRINTED_THRESHOLD
-from casadi_gnc.missions.checking.funnels import needed_share
 from casadi_gnc.missions.flight import Flight
 
 Changes = dict[str, Any]

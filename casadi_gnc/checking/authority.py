@@ -1,0 +1,140 @@
+"""Can the actuators make what the law may ask for, and hold what pushes from outside?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+
+import casadi as ca
+import numpy as np
+from scipy.optimize import linprog
+
+from casadi_gnc.checking import standing
+from casadi_gnc.checking.allocation import allocation_slope, pushes_both_ways
+from casadi_gnc.checks import Check
+from casadi_gnc.missions.mission import Mission, Scheme
+
+#: Part of the load that may be left over where all of it is borne.
+_BORNE = 1e-6
+
+
+def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield the share of the virtual-control box that is made, and what standing still at the target takes."""
+    share = attainable_share(mission, scheme)
+    yield Check(
+        "authority.virtual_control",
+        share,
+        1.0,
+        "-",
+        "note",
+        "The law may ask for efforts that the actuators cannot make; what is missing is then up to the allocation.",
+        "Shrink the limits of the effort to that share, or feed back the achieved effort.",
+        "largest multiple of the box of limits, every corner of which the actuators can make",
+        at_least=True,
+    )
+    demand = static_demand(mission, scheme)
+    if np.isfinite(demand):
+        yield Check(
+            "authority.static_demand",
+            demand,
+            1.0,
+            "-",
+            "fail",
+            "At rest at the target the disturbance alone needs more than the actuators and limits give.",
+            "Raise the limits, add actuators, or accept that the target is not held.",
+            "least share of actuator bounds and limits that cancels the plant's acceleration at the target, any time",
+        )
+    if mission.target and pushes_both_ways(scheme) and scheme.actuation.inverse is None:
+        yield Check(
+            "authority.allocated_demand",
+            allocated_demand(mission, scheme, allocation_slope(mission, scheme)),
+            1.0,
+            "-",
+            "fail",
+            "As this allocation shares it out, standing still at times takes more than the limits: it drifts off.",
+            "Raise the limits of the effort, or allocate against the errors and faults that take the effort away.",
+            "effort that cancels disturbance and faults through (true effectiveness) x (slope of the allocation)",
+        )
+
+
+def believed(mission: Mission, scheme: Scheme) -> np.ndarray:
+    """Return the believed effectiveness at the first measurement, (R, N)."""
+    quiet = ca.DM.zeros(mission.truth.noise.size)
+    y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), quiet))
+    return np.array(ca.DM(scheme.actuation.matrix(mission.truth.measurement.split(y))).full())
+
+
+def attainable_share(mission: Mission, scheme: Scheme) -> float:
+    """Return the largest s such that all corners of s times the box of limits can be made."""
+    matrix, actuation = believed(mission, scheme), scheme.actuation
+    corners = np.stack(
+        np.meshgrid(*zip(actuation.limit_below, actuation.limit_above, strict=True), indexing="ij"), axis=-1
+    )
+    shares = []
+    for corner in np.unique(corners.reshape(-1, matrix.shape[0]), axis=0):
+        # Variables: actuators, s; matrix F = s corner.
+        found = linprog(
+            np.r_[np.zeros(matrix.shape[1]), -1.0],
+            A_eq=np.column_stack([matrix, -corner]),
+            b_eq=np.zeros(len(corner)),
+            bounds=[*zip(actuation.lower, actuation.upper, strict=True), (0, 1e6)],
+        )
+        shares.append(found.x[-1] if found.status == 0 else 0.0)
+    return float(min(shares))
+
+
+def static_demand(mission: Mission, scheme: Scheme) -> float:
+    """Return the largest share, over the flight, of bounds and limits needed to stand still at the target."""
+    if not mission.target:
+        return float("nan")
+    actuation, matrix = scheme.actuation, believed(mission, scheme)
+    lower, upper, below, above = (
+        tuple(each) for each in (actuation.lower, actuation.upper, actuation.limit_below, actuation.limit_above)
+    )
+    return _static_demand(mission, matrix.tobytes(), matrix.shape, lower, upper, below, above)
+
+
+@lru_cache(maxsize=8)
+def _static_demand(mission: Mission, data: bytes, shape: tuple[int, int], *box: tuple[float, ...]) -> float:
+    """Return the share for one believed effectiveness and one box; schemes often have the same."""
+    matrix = np.frombuffer(data).reshape(shape)
+    lower, upper, below, above = (np.array(each) for each in box)
+    _, drift, gain = standing.loads(mission)
+    kept = standing.lasting(gain)
+    drift, gain, n = drift[kept], gain[kept], shape[1]
+    shares = []
+    # The share is convex in the load, so its largest may lie between the extremes of single rows: every time counts.
+    for k in range(len(drift)):
+        # Variables: actuators, s; bounds and limits grow with s.
+        found = linprog(
+            np.r_[np.zeros(n), 1.0],
+            A_ub=np.vstack(
+                [
+                    np.column_stack([np.eye(n), -upper]),
+                    np.column_stack([-np.eye(n), lower]),
+                    np.column_stack([matrix, -above]),
+                    np.column_stack([-matrix, below]),
+                ]
+            ),
+            b_ub=np.zeros(2 * n + 2 * len(matrix)),
+            A_eq=np.column_stack([gain[k], np.zeros(len(gain[k]))]),
+            b_eq=-drift[k],
+            bounds=[(None, None)] * n + [(0, None)],
+        )
+        shares.append(found.x[-1] if found.status == 0 else float("inf"))
+    return float(max(shares, default=float("nan")))
+
+
+def allocated_demand(mission: Mission, scheme: Scheme, slope: np.ndarray) -> float:
+    """Return the largest share of bounds and limits that standing still takes through an allocation F = slope u."""
+    _, drift, gain = standing.loads(mission)
+    kept = standing.lasting(gain)
+    wanted = standing.efforts(mission, slope)[kept]
+    made = wanted @ slope.T
+    left = np.einsum("kij,kj->ki", gain[kept], made) + drift[kept]
+    if np.abs(left).max(initial=0.0) > _BORNE * np.abs(drift).max(initial=0.0):
+        return float("inf")
+    actuation = scheme.actuation
+    shares = [wanted / np.array(actuation.limit_above), wanted / np.array(actuation.limit_below)]
+    shares += [made / np.array(actuation.upper), made / np.array(actuation.lower)]
+    return float(np.hstack(shares).max(initial=0.0))

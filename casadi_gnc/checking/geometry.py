@@ -1,0 +1,88 @@
+"""Is the craft's geometry one: actuators that make every effort, inertias that bodies can have?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.checking.authority import believed
+from casadi_gnc.checks import Check
+from casadi_gnc.missions.mission import Mission, Scheme
+
+#: Largest condition number of the effectiveness that is no nuisance.
+_WELL_CONDITIONED = 100.0
+
+
+def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield rank and conditioning of the effectiveness, and the inertias."""
+    matrix = scale(scheme) @ believed(mission, scheme)
+    strength = np.linalg.svd(matrix, compute_uv=False)
+    rank_gap = float(strength[-1] / strength[0]) if strength[0] > 0 else 0.0
+    yield Check(
+        "geometry.effectiveness",
+        rank_gap,
+        1e-6,
+        "-",
+        "fail",
+        "Some effort cannot be made by any combination of the actuators.",
+        "Add or turn an actuator.",
+        "smallest over largest singular value of the effectiveness, rows scaled by their limits",
+        at_least=True,
+    )
+    conditioning = 1 / rank_gap if rank_gap > 0 else float("inf")
+    yield Check(
+        "geometry.conditioning",
+        conditioning,
+        _WELL_CONDITIONED,
+        "-",
+        "warn",
+        "Some effort costs the actuators very much more than another.",
+        "Turn the actuators, or fit the limits of the effort to what the actuators make.",
+        "condition number of the effectiveness, rows scaled by their limits",
+    )
+    for whose, body in (("believed", scheme.law), ("true", mission.truth)):
+        inertia = _inertia(body)
+        if inertia is not None:
+            yield triangle(f"geometry.{whose}_inertia", inertia)
+
+
+def scale(scheme: Scheme) -> np.ndarray:
+    """Return the matrix that scales efforts by their limits, (R, R)."""
+    below, above = (np.abs(np.array(each)) for each in (scheme.actuation.limit_below, scheme.actuation.limit_above))
+    return np.diag(1 / np.maximum(below, above))
+
+
+def triangle(name: str, inertia: np.ndarray) -> Check:
+    """Return how far an inertia, (3, 3), is from that of a flat plate, which no body passes."""
+    least, middle, largest = np.linalg.eigvalsh(inertia)
+    return Check(
+        name,
+        float(min(least, least + middle - largest) / largest),
+        0.0,
+        "-",
+        "fail",
+        "No body has this inertia: a moment is negative or larger than the two others together.",
+        "Correct the inertia.",
+        "smallest principal moment, and the two smaller less the largest, over the largest",
+        at_least=True,
+    )
+
+
+def rotation(name: str, matrix: Any, consequence: str, remedy: str) -> Check:
+    """Return how far a matrix, (3, 3), is from a rotation."""
+    turned = np.array(ca.DM(matrix))
+    residual = float(max(np.abs(turned @ turned.T - np.eye(3)).max(), abs(np.linalg.det(turned) - 1)))
+    return Check(name, residual, 1e-3, "-", "warn", consequence, remedy, "largest entry of R R' - I, and det R - 1")
+
+
+def _inertia(holder: Any) -> np.ndarray | None:
+    """Return the inertia that a law believes or a plant has, (3, 3), if it has one of numbers."""
+    for at in (holder, getattr(holder, "body", None), getattr(getattr(holder, "motion", None), "body", None)):
+        found = getattr(at, "inertia", None)
+        if found is not None and not isinstance(found, (ca.SX, ca.MX)):
+            return np.array(ca.DM(found))
+    body = getattr(getattr(holder, "body", None), "body", None)
+    return None if body is None else np.array(ca.DM(body.inertia))

@@ -1,0 +1,1 @@
+"""Hand a controller on: flight packages, their vectors and verification, mock-up units."""

@@ -1,0 +1,56 @@
+"""Generate a functional mock-up unit (FMI 2.0, co-simulation) of a mission's controller."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+
+from casadi_gnc.delivery.describing import describe
+from casadi_gnc.delivery.vectors import sampled
+from casadi_gnc.embedded import fmu
+from casadi_gnc.embedded.controller import Options
+from casadi_gnc.errors import OutputError, PackageError
+from casadi_gnc.problem_files.loading import load, read
+from casadi_gnc.system.files import prepare_folder, write_beside
+
+_REALS = {"float64": "double", "float32": "float"}
+
+
+def generate_fmu(
+    problem: str | Path,
+    out: Path | None = None,
+    *,
+    scheme: str | None = None,
+    name: str | None = None,
+    real: str = "float64",
+    tunable: Sequence[str] = (),
+) -> Path:
+    """Write the controller of a scheme as an .fmu; return its path.
+
+    Parameters
+    ----------
+    problem : a mission file, or the name of a shipped one.
+    out : the file; flight/<name>.fmu by default. An existing unit is replaced, another file is not.
+    scheme, name, real, tunable : as for `casadi_gnc.delivery.packaging.generate`; tunable gains become parameters.
+
+    Raises
+    ------
+    GncError
+        Where something given is not right; nothing is written then.
+    """
+    path, _, _ = read(problem)
+    mission = sampled(load(problem))
+    if real not in _REALS:
+        raise PackageError(f"real is {real!r}, expected float64 or float32")
+    options = Options(path.stem if name is None else name, _REALS[real])  # type: ignore[arg-type]
+    target = Path("flight") / f"{options.name}.fmu" if out is None else out
+    if target.suffix != ".fmu" or target.is_dir():
+        raise OutputError(f"{target} does not end in .fmu; name the file to write with --out")
+    controller = describe(mission, scheme, tunable)
+    files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration)
+    prepare_folder(target.parent)
+    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
+        write_beside(target, lambda place: fmu.build(files, options, Path(workshop), place))
+    return target

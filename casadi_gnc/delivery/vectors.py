@@ -1,0 +1,102 @@
+"""Fly a package in closed loop with its mission's plant: the vectors that it is shipped with.
+
+The plant runs in double precision with the elementary functions of `codegen/runtime`, so the vectors
+have the same words wherever they are made.
+"""
+
+from __future__ import annotations
+
+import ctypes
+
+import numpy as np
+
+from casadi_gnc.embedded.compare import as_numbers, as_words
+from casadi_gnc.embedded.host import HostPackage
+from casadi_gnc.embedded.printer import print_function
+from casadi_gnc.mathematics.noise import uniform_count, uniforms
+from casadi_gnc.missions import tapes
+from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.system import assets, compilers
+
+#: What bad sensors say, in turn: the controller must raise a status and stay finite.
+BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 5e-324, -0.0)
+
+
+class CompiledPlant:
+    """Measure and move a mission's plant in compiled C."""
+
+    def __init__(self, mission: Mission, scheme: Scheme) -> None:
+        built = tapes.build(mission, scheme)
+        names = [name for name in ("sense", "draw", "plant", "settle") if name in built.functions]
+        text = ['#include "gnc_math.h"', "typedef double gnc_real;"]
+        for name in names:
+            ports = [*built.functions[name].name_in(), *built.functions[name].name_out()]
+            text.append(print_function(built.functions[name]))
+            given = ", ".join(f"gnc_real *{port}" for port in ports)
+            text.append(f"void call_{name}({given}); void call_{name}({given}) {{ {name}({', '.join(ports)}); }}")
+        self._c = compilers.load("\n".join(text), include=assets.folder("codegen") / "runtime")
+        self._mission, self._sizes = mission, {name: built.functions[name].numel_out(0) for name in names}
+        self.x = np.array(mission.start, dtype=float)
+
+    def _call(self, name: str, *columns: np.ndarray) -> np.ndarray:
+        result = np.zeros(max(self._sizes[name], 1))
+        given = [np.ascontiguousarray(column, dtype=float) for column in columns]
+        getattr(self._c, f"call_{name}")(*(ctypes.c_void_p(column.ctypes.data) for column in (*given, result)))
+        return result[: self._sizes[name]]
+
+    def noise(self, sample: int) -> np.ndarray:
+        """Return the standard normal numbers of a sample."""
+        count, drawn = self._mission.truth.noise.size, self._mission.noise
+        if not count:
+            return np.zeros(1)
+        return self._call("draw", uniforms(drawn.seed, sample // drawn.every, uniform_count(count)))
+
+    def measure(self, sample: int) -> np.ndarray:
+        """Return the time and what the sensors say."""
+        t = np.array([sample * self._mission.timing.sample_period])
+        return np.concatenate([t, self._call("sense", t, self.x, self.noise(sample))])
+
+    def advance(self, sample: int, actuators: np.ndarray) -> None:
+        """Move over one sample period under held actuators."""
+        timing, noise = self._mission.timing, self.noise(sample)
+        for i in range(timing.substeps):
+            at = np.array([sample * timing.sample_period + i * (timing.sample_period / timing.substeps)])
+            self.x = self._call("plant", at, self.x, actuators, noise)
+        self.x = self._call("settle", self.x)
+
+
+def fly_package(
+    mission: Mission, scheme: Scheme, package: HostPackage, outputs: int, steps: int, spoiled: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return words in (steps, 1 + measured) and out (steps, outputs) of a closed loop from the mission's start.
+
+    Parameters
+    ----------
+    mission : in sampled mode.
+    package : reset; it is stepped.
+    outputs : words of an output, the actuators first, the status last.
+    spoiled : of the last steps, each has one measured number replaced by a bad one.
+    """
+    plant, count = CompiledPlant(mission, scheme), mission.truth.inputs.size
+    rows_in, rows_out = [], []
+    for k in range(steps):
+        row = plant.measure(k)
+        if k >= steps - spoiled:
+            row = _spoil(row, k - (steps - spoiled))
+        rows_in.append(as_words(row, package.word))
+        rows_out.append(package.replay(rows_in[-1][None, :], outputs)[0])
+        plant.advance(k, as_numbers(rows_out[-1][:count]).astype(float))
+    return np.array(rows_in), np.array(rows_out)
+
+
+def _spoil(row: np.ndarray, number: int) -> np.ndarray:
+    """Return the row with a bad number; every third stays good, so that recovery is seen too."""
+    row = row.copy()
+    if number % 3 != 2:
+        row[1 + (number * 5) % (len(row) - 1)] = BAD[number % len(BAD)]
+    return row
+
+
+def sampled(mission: Mission) -> Mission:
+    """Return the mission as it flies on board: sampled."""
+    return mission if mission.timing.mode == "sampled" else mission.with_timing(mode="sampled")

@@ -1,0 +1,1 @@
+"""Arithmetic that gives the same words everywhere: bounds, exact constants, integrators, noise."""

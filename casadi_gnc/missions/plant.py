@@ -1,0 +1,62 @@
+"""What every plant is: a named state, what is measured of it, and how it moves.
+
+Noise is an argument, not a call: an engine draws standard normal numbers for every sample (see
+`casadi_gnc.mathematics.noise`) and holds them over it, so that a plant stays a pure function and every engine
+sees the same numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from casadi_gnc.signals import Layout
+from casadi_gnc.status import StepStatus
+
+
+class Plant:
+    """Base of all plants; a subclass is a frozen dataclass of its physical data."""
+
+    @property
+    def state(self) -> Layout:
+        """What the plant remembers."""
+        raise TypeError(f"{type(self).__name__} defines no state")
+
+    @property
+    def measurement(self) -> Layout:
+        """What the sensors give; `limit` of a signal is the largest magnitude that can be true."""
+        raise TypeError(f"{type(self).__name__} defines no measurement")
+
+    @property
+    def inputs(self) -> Layout:
+        """What the actuators are told."""
+        raise TypeError(f"{type(self).__name__} defines no inputs")
+
+    @property
+    def noise(self) -> Layout:
+        """Standard normal numbers, drawn afresh and held, that `measure` and `rate` scale."""
+        return Layout()
+
+    @property
+    def outputs(self) -> Layout:
+        """True signals that are recorded besides the state."""
+        return Layout()
+
+    def measure(self, t: Any, x: Any, noise: Any) -> Any:
+        """Return what the sensors say at time t [s], a column of `measurement`: the state itself."""
+        return x
+
+    def rate(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
+        """Return x', a column of `state`."""
+        raise TypeError(f"{type(self).__name__} defines no rate")
+
+    def settle(self, x: Any) -> Any:
+        """Return the same physical state in the representation kept between steps."""
+        return x
+
+    def show(self, t: Any, x: Any, actuators: Any) -> dict[str, Any]:
+        """Return the signals of `outputs`."""
+        return {}
+
+    def status(self, t: Any, x: Any, actuators: Any) -> dict[StepStatus, Any]:
+        """Return flags (0 or 1 expressions) by status bit: what truly happened, seen from outside."""
+        return {}

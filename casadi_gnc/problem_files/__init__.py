@@ -1,0 +1,1 @@
+"""Problem files: find, check, build, change, sweep; missions, allocations and syntheses."""

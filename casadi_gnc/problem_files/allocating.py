@@ -1,0 +1,176 @@
+"""Allocate rows of commands, from a table or from a stream, and lay out the answers."""
+
+from __future__ import annotations
+
+import csv
+import math
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.allocation import AllocationStatus, Allocator, Answer
+from casadi_gnc.allocation.allocator import Accuracy
+from casadi_gnc.allocation.modes import along_direction, with_minimum_impulse
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.problem_files.allocation_file import AllocationCase
+
+
+class CaseAllocator:
+    """Allocate command after command with the options of an allocation file."""
+
+    def __init__(self, case: AllocationCase, backend: str, accuracy: Accuracy = "mid") -> None:
+        self.case = case
+        self._accuracy: Accuracy = accuracy
+        self._allocator = Allocator(case.problem, backend, accuracy=accuracy)
+
+    def solve(self, command: np.ndarray) -> Answer:
+        """Return the answer to a command (R,) in its own unit; unallocated effort is in that unit too."""
+        case, scaled = self.case, np.asarray(command, dtype=float) * self.case.row_scale
+        started = time.perf_counter()
+        if case.least_force is not None:
+            answer = with_minimum_impulse(
+                case.problem,
+                scaled,
+                case.least_force,
+                self._allocator.previous,
+                backend=self._allocator.backend,
+                accuracy=self._accuracy,
+            )
+            self._allocator.previous = answer.forces.copy()
+        elif case.keep_direction:
+            answer, _ = along_direction(self._allocator, scaled)
+        else:
+            answer = self._allocator.solve(scaled)
+        seconds = time.perf_counter() - started  # all of it, certificate and linear programs included
+        return replace(answer, unallocated=answer.unallocated / case.row_scale, seconds=seconds)
+
+
+def read_commands(path: Path, rows: int) -> np.ndarray:
+    """Return the commands of a CSV file with the columns u1 ... uR, (K, R).
+
+    Raises
+    ------
+    ProblemError
+        For a file that cannot be read, a missing column, or an entry that is no number, by row and
+        column. Entries like nan are numbers here; their answers say BAD_COMMAND.
+    """
+    names = [f"u{i}" for i in range(1, rows + 1)]
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            lacking = [name for name in names if name not in (reader.fieldnames or [])]
+            if lacking:
+                found = ", ".join(reader.fieldnames or []) or "nothing"
+                raise ProblemError(
+                    f"column {lacking[0]} is missing in the first line; expected {', '.join(names)}, found {found}",
+                    path.name,
+                )
+            commands = [[_number(row[name], path, reader.line_num, name) for name in names] for row in reader]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ProblemError(f"cannot be read as CSV: {error}", str(path)) from error
+    if not commands:
+        raise ProblemError("has a header and no rows of commands", path.name)
+    return np.array(commands)
+
+
+def _number(text: str | None, path: Path, line: int, name: str) -> float:
+    try:
+        return float(text or "")
+    except ValueError:
+        raise ProblemError(f"{text!r} is no number", f"{path.name}, line {line}, column {name}") from None
+
+
+def parse_line(text: str, rows: int) -> np.ndarray:
+    """Return the command on one line, numbers apart by commas or blanks; raise `ValueError` saying why."""
+    parts = text.replace(",", " ").split()
+    if len(parts) != rows:
+        raise ValueError(f"expected {rows} numbers, got {len(parts)}")
+    try:
+        return np.array([float(part) for part in parts])
+    except ValueError as error:
+        raise ValueError(str(error)) from None
+
+
+def header(count: int, rows: int) -> list[str]:
+    """Return the names of the columns of `row_of`."""
+    forces = [f"F{i}" for i in range(1, count + 1)]
+    missing = [f"unallocated{i}" for i in range(1, rows + 1)]
+    codes = [f"saturation{i}" for i in range(1, count + 1)]
+    return [*forces, "status", "objective", "duality_gap", "worst_vertex", "iterations", *missing, *codes]
+
+
+def row_of(answer: Answer) -> list[Any]:
+    """Return an answer as the entries of one row, full precision."""
+    numbers = [repr(float(value)) for value in answer.forces]
+    missing = [repr(float(value)) for value in answer.unallocated]
+    certificate = [
+        repr(float(answer.objective)),
+        repr(float(answer.duality_gap)),
+        answer.worst_vertex,
+        answer.iterations,
+    ]
+    return [*numbers, answer.status.name, *certificate, *missing, *(int(code) for code in answer.saturation)]
+
+
+def as_data(answer: Answer) -> dict[str, Any]:
+    """Return an answer as plain data for JSON; numbers that are not finite become null."""
+    return {
+        "forces": [float(value) for value in answer.forces],
+        "status": answer.status.name,
+        "objective": _finite(answer.objective),
+        "duality_gap": _finite(answer.duality_gap),
+        "vertex_weights": [float(value) for value in answer.vertex_weights],
+        "worst_vertex": answer.worst_vertex,
+        "unallocated": [_finite(value) for value in answer.unallocated],
+        "saturation": [int(code) for code in answer.saturation],
+        "iterations": answer.iterations,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+@dataclass
+class Tally:
+    """Count answers, and keep how long each took and how good it was."""
+
+    seconds: list[float] = field(default_factory=list)
+    statuses: dict[str, int] = field(default_factory=dict)
+    worst_gap: float | None = None
+    malformed: int = 0
+
+    def add(self, answer: Answer) -> None:
+        """Count one answer."""
+        self.seconds.append(answer.seconds)
+        self.statuses[answer.status.name] = self.statuses.get(answer.status.name, 0) + 1
+        if answer.status is not AllocationStatus.BAD_COMMAND:
+            self.worst_gap = max(self.worst_gap or 0.0, answer.relative_gap)
+
+    def summary(self) -> dict[str, Any]:
+        """Return counts, the largest relative gap of all answers, and latency percentiles."""
+        latency = {}
+        if self.seconds:
+            points = np.percentile(np.array(self.seconds) * 1e6, [50, 95, 99, 100])
+            latency = {
+                f"{name}_us": round(float(v), 2) for name, v in zip(("p50", "p95", "p99", "max"), points, strict=True)
+            }
+        return {
+            "answers": len(self.seconds),
+            "malformed": self.malformed,
+            "statuses": self.statuses,
+            "largest_relative_gap": self.worst_gap,
+            "latency": latency,
+        }
+
+
+def allocate_all(allocator: CaseAllocator, commands: Iterable[np.ndarray], tally: Tally) -> Iterator[Answer]:
+    """Yield the answer to each command in order, counted in `tally`."""
+    for command in commands:
+        answer = allocator.solve(command)
+        tally.add(answer)
+        yield answer

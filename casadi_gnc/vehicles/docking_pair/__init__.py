@@ -1,0 +1,1 @@
+"""Two craft that dock by their magnetic coils."""

@@ -1,0 +1,1 @@
+"""A satellite around a free-falling test mass."""

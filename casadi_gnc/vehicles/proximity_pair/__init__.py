@@ -1,0 +1,1 @@
+"""A chaser close to a tumbling target."""

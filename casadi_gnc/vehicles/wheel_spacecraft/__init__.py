@@ -1,0 +1,1 @@
+"""A spacecraft on reaction wheels."""
