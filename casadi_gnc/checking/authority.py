@@ -12,7 +12,8 @@ from scipy.optimize import linprog
 from casadi_gnc.checking import standing
 from casadi_gnc.checking.allocation import allocation_slope, pushes_both_ways
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Part of the load that may be left over where all of it is borne.
 _BORNE = 1e-6
@@ -59,8 +60,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
 
 def believed(mission: Mission, scheme: Scheme) -> np.ndarray:
     """Return the believed effectiveness at the first measurement, (R, N)."""
-    quiet = ca.DM.zeros(mission.truth.noise.size)
-    y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), quiet))
+    y = mission.first_measurement()
     return np.array(ca.DM(scheme.actuation.matrix(mission.truth.measurement.split(y))).full())
 
 

@@ -19,8 +19,8 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
-    from casadi_gnc.checking import check_file
     from casadi_gnc.checks import worst
+    from casadi_gnc.problem_files.checking import check_file
 
     title, found = check_file(problem, scheme)
     if plot is not None:

@@ -14,7 +14,10 @@ from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.missions import metrics, tapes
 from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine, VirtualMachineEngine
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.mission import Mission, Mode, Scheme
+from casadi_gnc.missions.loop import funnel_signals
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.missions.timing import Mode
 from casadi_gnc.status import StepStatus
 
 EngineName = Literal["c", "vm"]
@@ -101,7 +104,7 @@ def fly(
         made=made,
         seconds=seconds,
         notes=(
-            *mission.notes,
+            *mission.craft.notes(),
             *cautions(chosen),
             *notes,
             *_undefined(mission, values, raised),
@@ -172,7 +175,7 @@ def _left(mission: Mission, built: tapes.Tapes, record: np.ndarray) -> tuple[str
     for funnel in mission.funnels:
         if funnel.signal not in built.row:
             continue
-        lower, upper = (record[:, built.row.place(name)] for name in tapes.funnel_signals(mission, funnel).names[:2])
+        lower, upper = (record[:, built.row.place(name)] for name in funnel_signals(mission, funnel).names[:2])
         signal = record[:, built.row.place(funnel.signal)]
         outside = ~((signal > lower) & (signal < upper))
         if outside.any():

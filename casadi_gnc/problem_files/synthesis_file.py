@@ -14,9 +14,9 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from casadi_gnc.errors import ProblemError, SynthesisError
-from casadi_gnc.problem_files import loading
-from casadi_gnc.problem_files.schema import Format, NonNegative, Part, Positive
-from casadi_gnc.problem_files.toml_place import describe
+from casadi_gnc.problem_files.document import read_kind
+from casadi_gnc.problem_files.mission_tables import Format
+from casadi_gnc.tables.part import NonNegative, Part, Positive
 
 Table = Annotated[list[list[float]], Field(min_length=1)]
 
@@ -156,11 +156,11 @@ class SynthesisCase:
 
 def load_synthesis(problem: str | Path) -> SynthesisCase:
     """Return the case of a synthesis file, given by path or shipped name; raise `ProblemError`."""
-    path, text, data = loading.read_kind(problem, "synthesis")
-    model: SynthesisModel = loading.validated(SynthesisModel, data, path, text)
+    document = read_kind(problem, "synthesis")
+    model: SynthesisModel = document.validated(SynthesisModel)
     given = {key: value for key, value in model.recipe if value is not None and key != "type"}
-    arguments = {key: _array(value, describe(path, text, ("recipe", key))) for key, value in given.items()}
-    return SynthesisCase(path.stem, model.title, model.recipe.type, arguments, model.backend)
+    arguments = {key: _array(value, document.place(("recipe", key))) for key, value in given.items()}
+    return SynthesisCase(document.path.stem, model.title, model.recipe.type, arguments, model.backend)
 
 
 def _array(value: Any, place: str) -> Any:

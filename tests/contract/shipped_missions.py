@@ -4,7 +4,8 @@ from functools import cache
 
 import casadi_gnc
 from casadi_gnc.laws import LAWS, Law
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.problem_files.loading import read, shipped
 
 

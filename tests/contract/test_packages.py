@@ -8,7 +8,7 @@ import pytest
 from packages import copied, made, run
 
 import casadi_gnc
-from casadi_gnc.delivery.describing import describe
+from casadi_gnc.missions.onboard import describe
 from casadi_gnc.delivery.vectors import fly_package, sampled
 from casadi_gnc.embedded import compare, package
 from casadi_gnc.embedded.controller import Options

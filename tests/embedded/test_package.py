@@ -216,7 +216,7 @@ def test_tunable_gains_stay_variables(tmp_path):
     assert values["unconfigured hash"] == values["default hash"]
     assert values["refused hash"] == values["changed hash"] != values["default hash"]
     # The same measurements through CasADi's machine, with the gain folded.
-    from casadi_gnc.delivery.describing import describe
+    from casadi_gnc.missions.onboard import describe
     from casadi_gnc.embedded.machine import Machine
 
     mission = casadi_gnc.load("huang2020/slew").with_scheme("funnel_pinv", rate_gain=2.5)

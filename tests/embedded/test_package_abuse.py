@@ -6,7 +6,7 @@ from packages import C99, made, run, units
 
 import casadi_gnc
 import casadi_gnc.laws
-from casadi_gnc.delivery.describing import describe
+from casadi_gnc.missions.onboard import describe
 from casadi_gnc.delivery.packaging import read_vectors
 from casadi_gnc.delivery.vectors import CompiledPlant, sampled
 from casadi_gnc.embedded.compare import as_numbers, as_words

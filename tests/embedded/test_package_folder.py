@@ -9,7 +9,7 @@ from packages import copied, made
 
 import casadi_gnc
 from casadi_gnc.delivery import packaging
-from casadi_gnc.delivery.describing import describe
+from casadi_gnc.missions.onboard import describe
 from casadi_gnc.delivery.packaging import generate, read_vectors, verify
 from casadi_gnc.embedded import package
 from casadi_gnc.embedded.names import check_name

@@ -18,7 +18,10 @@ from casadi_gnc.checking import authority, check, funnels, geometry, noise, samp
 from casadi_gnc.checking.linear import LinearLoop, spectral_radius
 from casadi_gnc.checks import Check, worst
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.missions.mission import Actuation, Funnel, Mission, Scheme, Timing
+from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.scheme import Funnel, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.timing import Timing
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.problem_files.building import build
 from casadi_gnc.problem_files.loading import check as validate

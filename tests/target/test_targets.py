@@ -9,7 +9,7 @@ from packages import copied, made, need_target
 
 import casadi_gnc
 from casadi_gnc.allocation.in_flight import Direct
-from casadi_gnc.delivery.describing import describe
+from casadi_gnc.missions.onboard import describe
 from casadi_gnc.delivery.packaging import read_vectors
 from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import package, targets
