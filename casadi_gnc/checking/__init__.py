@@ -78,7 +78,7 @@ def as_data(checks: Iterable[Check]) -> list[dict[str, Any]]:
             "scheme": each.scheme,
             "value": _plain(each.value),
             "limit": _plain(each.limit),
-            "sense": "at least" if each.at_least else "at most",
+            "sense": ("more than" if each.strict else "at least") if each.at_least else "at most",
             "margin": _plain(each.margin),
             "unit": each.unit,
             "verdict": each.verdict,

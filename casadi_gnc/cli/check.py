@@ -58,7 +58,8 @@ def _print(title: str, found: list[Check], plot: Path | None) -> None:
             table.add_row(f"[bold]{escape(scheme)}[/]")
         for one in group:
             unit = "" if one.unit == "-" else f" {one.unit}"
-            limit = f"{'>=' if one.at_least else '<='} {one.limit:.4g}{unit}"
+            sense = (">" if one.strict else ">=") if one.at_least else ("<" if one.strict else "<=")
+            limit = f"{sense} {one.limit:.4g}{unit}"
             table.add_row(one.name, f"{one.value:.4g}", limit, f"[{colours[one.verdict]}]{one.verdict}[/]")
     # Nothing is cut, however narrow the terminal: a line that is too long runs on.
     console = Console(soft_wrap=True)

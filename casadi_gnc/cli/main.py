@@ -11,6 +11,7 @@ from casadi_gnc.cli import (
     allocate,
     attainable,
     bench,
+    catalogue,
     check,
     doctor,
     fly,
@@ -41,12 +42,15 @@ app.command("verify")(verify.verify)
 app.add_typer(bench.app, name="bench")
 app.add_typer(problems.app, name="problems")
 app.command("reproduce")(reproduce.reproduce)
+app.command("laws")(catalogue.laws)
+app.command("crafts")(catalogue.crafts)
 app.command("schema")(schema.schema)
 app.command("doctor")(doctor.doctor)
 
 
 def main() -> None:
     """Run the command line; turn what a user can put right into one sentence on stderr."""
+    _say_what_code_runs()
     try:
         app()
         sys.stdout.flush()
@@ -60,6 +64,17 @@ def main() -> None:
     except OSError as error:
         _silence()
         _end(f"casadi-gnc: cannot write the output: {error.strerror or error}", 2)
+
+
+def _say_what_code_runs() -> None:
+    """Print on stderr which file of the user's own code is run, before it is."""
+    import logging
+
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("casadi-gnc: %(message)s"))
+    logger = logging.getLogger("casadi_gnc")
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
 
 
 def _end(sentence: str, code: int) -> None:

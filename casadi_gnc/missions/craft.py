@@ -100,7 +100,8 @@ class Craft(Part):
         plant, effort = mission.truth, mission.schemes[0].actuation.effort
         seen = [Panel("lines", name, name.replace("_", " ")) for name in plant.measurement.names if name in plant.state]
         made = [Panel("effort", name, name.replace("_", " ")) for name in effort.names]
-        told = [Panel("actuators", name, name.replace("_", " ")) for name in plant.inputs.names]
+        others = [name for name in plant.inputs.names if name not in effort]
+        told = [Panel("actuators", name, name.replace("_", " ")) for name in others]
         return (*seen, *made, *told)
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterable[Check]:

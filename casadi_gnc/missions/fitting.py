@@ -35,10 +35,14 @@ def misfits(law: type[Law], measured: Layout, believed: Any, effort: Layout) -> 
         given = "nothing" if believed is None else f"a {type(believed).__name__}"
         yield f"it models a {kind.__name__}, and the craft's software believes in {given}"
         return
-    for signal in law.reads(believed).signals:
-        if signal.name not in measured:
-            yield f"it reads {signal.name}, which is not measured; there is {', '.join(measured.names) or 'nothing'}"
-        else:
+    read = law.reads(believed).signals
+    absent = [signal.name for signal in read if signal.name not in measured]
+    if absent:
+        are = "is" if len(absent) == 1 else "are"
+        known = ", ".join(measured.names) or "nothing"
+        yield f"it reads {' and '.join(absent)}, which {are} not measured; there is {known}"
+    for signal in read:
+        if signal.name in measured:
             yield from _apart(signal, measured.signal(signal.name), f"it reads {signal.name}", "measured")
     if law.effort is None:
         return

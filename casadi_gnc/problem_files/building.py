@@ -51,11 +51,14 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     for i, table in enumerate(common.funnel):
         with complaints.about("funnel", i):
             funnels.append(_funnel(table, parts))
+    wrong = {table.signal for table in common.funnel} - {funnel.signal for funnel in funnels}
     noise = Noise()
     with complaints.about("noise"):
         noise = _noise(common.noise, timing)
     schemes = []
     for i, (table, law, gains) in enumerate(checked.schemes):
+        if wrong.intersection(law.funnels.values()):
+            continue  # what is wrong with its funnel was said
         with complaints.about("scheme", i):
             schemes.append(_scheme(table, law, gains, parts, funnels, timing, strict))
     further = []
@@ -173,20 +176,22 @@ def _scheme(
     actuation = parts.craft.actuation(keys)
     why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
     if why:
-        told = f"the law {law.__name__} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
+        told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
         raise MisfitError(f"{told}; `casadi-gnc laws` says which fits what", "law", "type")
     named = list(law.errata) if table.as_printed is True else table.as_printed or []
     for name in named:
         if name not in law.errata:
             known = ", ".join(law.errata) or "none"
-            raise MisfitError(f"{law.__name__} has no erratum {name!r}; known: {known}", "as_printed")
+            raise MisfitError(f"{table.law['type']} has no erratum {name!r}; known: {known}", "as_printed")
     given: dict[str, Any] = {key: getattr(gains, key) for key in gains_of(law)}
     given = {key: ca.DM(value) if isinstance(value, list) else value for key, value in given.items()}
     for key, signal in law.funnels.items():
         bounds = next((funnel.bounds for funnel in funnels if funnel.signal == signal), None)
         if bounds is None:
             found = ", ".join(funnel.signal for funnel in funnels) or "none"
-            raise MisfitError(f"the law {law.__name__} needs a [[funnel]] on {signal}, and the file has {found}", "law")
+            raise MisfitError(
+                f"the law {table.law['type']!r} needs a [[funnel]] on {signal}, and the file has {found}", "law"
+            )
         given[key] = bounds
     if law.belief_kind() is not None:
         given["body"] = parts.believed

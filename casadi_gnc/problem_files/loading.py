@@ -69,11 +69,12 @@ def load(problem: str | Path, changes: Mapping[str, Any] | None = None, *, stric
     >>> mission.timing.samples
     15001
     """
-    return load_document(read_kind(problem, "mission"), changes or {}, strict=strict)
+    return load_document(read_kind(problem, "mission"), changes, strict=strict)
 
 
-def load_document(document: Document, changes: Mapping[str, Any], *, strict: bool = True) -> Mission:
+def load_document(document: Document, changes: Mapping[str, Any] | None = None, *, strict: bool = True) -> Mission:
     """Return the mission of a document; arguments and errors as for `load`."""
+    changes = changes or {}
     with guests.recorded() as files:
         checked = check_tables(document, changes)
         mission = building.mission(checked, strict=strict)
