@@ -16,6 +16,7 @@ from casadi_gnc.cli import (
     doctor,
     fly,
     generate,
+    new,
     problems,
     reproduce,
     schema,
@@ -42,6 +43,7 @@ app.command("verify")(verify.verify)
 app.add_typer(bench.app, name="bench")
 app.add_typer(problems.app, name="problems")
 app.command("reproduce")(reproduce.reproduce)
+app.command("new")(new.new)
 app.command("laws")(catalogue.laws)
 app.command("crafts")(catalogue.crafts)
 app.command("schema")(schema.schema)

@@ -16,12 +16,24 @@ import numpy as np
 from casadi_gnc.allocation import Allocate, OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
 from casadi_gnc.embedded.source import environment
+from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.noise import uniform_count, uniforms
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.tapes import Tapes, call
+from casadi_gnc.registry import Registry
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers
+
+#: Engines by name: shipped ones, and those of installed packages; each is made of (mission, scheme, tapes).
+REGISTRY = Registry(
+    "engine",
+    "casadi_gnc.engines",
+    {"c": f"{__name__}:CompiledEngine", "vm": f"{__name__}:VirtualMachineEngine"},
+    is_one=lambda thing: isinstance(thing, type) and all(hasattr(thing, part) for part in ("name", "first", "run")),
+    expected="a class with name, first and run, as casadi_gnc.missions.engines.Engine",
+    error=FlightError,
+)
 
 
 @dataclass(eq=False)
