@@ -97,8 +97,13 @@ class Craft(Part):
 
     def panels(self, mission: Mission) -> Sequence[Panel]:
         """Return what a flight's picture shows: what is measured, the efforts, the actuators."""
-        plant, effort = mission.truth, mission.schemes[0].actuation.effort
-        seen = [Panel("lines", name, name.replace("_", " ")) for name in plant.measurement.names if name in plant.state]
+        plant, effort, goals = mission.truth, mission.schemes[0].actuation.effort, self.regulated(mission)
+        tracked = {name for name, goal in goals.items() if not any(goal)} | {one.signal for one in mission.funnels}
+        seen = [
+            Panel("tracked" if name in tracked else "lines", name, name.replace("_", " "))
+            for name in plant.measurement.names
+            if name in plant.state
+        ]
         made = [Panel("effort", name, name.replace("_", " ")) for name in effort.names]
         others = [name for name in plant.inputs.names if name not in effort]
         told = [Panel("actuators", name, name.replace("_", " ")) for name in others]
