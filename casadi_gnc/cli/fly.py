@@ -15,13 +15,6 @@ if TYPE_CHECKING:
     from casadi_gnc.problem_files.sweeping import Sweep
 
 
-class EngineChoice(str, Enum):
-    """Who computes."""
-
-    c = "c"
-    vm = "vm"
-
-
 class MathChoice(str, Enum):
     """Whose elementary functions."""
 
@@ -40,7 +33,9 @@ def fly(
     problem: Annotated[str, typer.Argument(help="A problem file, or the name of a shipped one.")],
     out: Annotated[Path | None, typer.Option(help="Folder for the results; out/<mission> if left out.")] = None,
     scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
-    engine: Annotated[EngineChoice, typer.Option(help="Compiled C, or CasADi's virtual machine.")] = EngineChoice.c,
+    engine: Annotated[
+        str, typer.Option(help="c: compiled C; vm: CasADi's virtual machine; or ./file.py:CLASS, or a package's.")
+    ] = "c",
     math: Annotated[
         MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")
     ] = MathChoice.gnc,
@@ -50,17 +45,19 @@ def fly(
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
     """Fly a mission and write <scheme>.npz, summary.json and pictures; of one with sweeps summary.json alone."""
+    from casadi_gnc.missions import engines
     from casadi_gnc.missions import flight as results
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.problem_files.sweeping import load_sweeps
     from casadi_gnc.system.files import prepare_folder
 
+    engines.REGISTRY.find(engine)  # a name that leads nowhere is told before anything is made
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)
     if sweeps := load_sweeps(problem):
-        options = {"engine": engine.value, "maths": math.value, "mode": mode.value if mode else None}
+        options = {"engine": engine, "maths": math.value, "mode": mode.value if mode else None}
         _fly_sweeps(mission, sweeps, list(dict.fromkeys(chosen)), folder, json, options)
         return
     flights, written = [], []
@@ -69,7 +66,7 @@ def fly(
         with _Progress(name, quiet=json) as progress:
             flights.append(
                 fly_one(
-                    mission, name, engine=engine.value, maths=math.value, mode=mode.value if mode else None,
+                    mission, name, engine=engine, maths=math.value, mode=mode.value if mode else None,
                     decimation=decimation, progress=progress,
                 )
             )  # fmt: skip

@@ -179,8 +179,20 @@ def of_file(path: Path) -> Target:
     if wrong or missing:
         told = f"unknown key {wrong[0]!r}" if wrong else f"{missing[0]!r} is missing"
         raise TargetError(f"the target {path.name}: {told}; expected {', '.join(known)}")
+    for key, value in fields.items():
+        is_text = Target.__dataclass_fields__[key].type == "str"
+        fits = isinstance(value, str) if is_text else _are_texts(value)
+        if not fits:
+            expected = "a text" if is_text else "a list of texts"
+            raise TargetError(f"the target {path.name}: {key} is {value!r}, expected {expected}")
+    if not fields["emulator"]:
+        raise TargetError(f"the target {path.name}: emulator is empty, expected the command that runs an image")
     whole: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
     return Target(path.stem, **whole, folder=path.parent)
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, str) for one in value)
 
 
 def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", float_only: bool = False) -> Measured:
@@ -260,7 +272,9 @@ def _run(command: list[str], target: Target) -> str:
     except (OSError, subprocess.SubprocessError) as error:
         raise TargetError(f"target {target.name}: {command[0]} could not be run: {error}") from error
     if done.returncode:
-        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+        lines = [line for line in done.stderr.splitlines() if not line.startswith("collect2:")]
+        said = [line for word in ("error", "cannot", "undefined", "overflow") for line in lines if word in line]
+        complaint = said[0] if said else done.stderr[:200]
         raise TargetError(f"target {target.name}: {command[0]} refused: {complaint.strip()}")
     return done.stdout
 
