@@ -1,4 +1,4 @@
-"""Ask a law or a plant for an expression, and tell its author what is wrong with the answer.
+"""Ask a law, a plant or a craft, and tell its author what is wrong with the answer.
 
 Whoever writes a law is told in one sentence, with the class and the method: a call that fails, a list in the
 place of a column, a column of another size, NaN that was meant for "unknown".
@@ -13,8 +13,22 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc import guests
-from casadi_gnc.errors import GncError, LawError
+from casadi_gnc.errors import FlightError, GncError, LawError
+from casadi_gnc.missions.plant import Plant
 from casadi_gnc.signals import Layout
+from casadi_gnc.tables.part import MisfitError
+
+
+#: What Python decides at once is not known of a symbol.
+_ON_SYMBOLS = "Python's if, and, or, min, max cannot decide on symbols; take casadi.if_else or casadi_gnc.mathematics.bounds"
+
+
+def plant_of(craft: Any) -> Plant:
+    """Return the plant of a craft, if that is what `plant` returns."""
+    found = ask(craft, "plant")
+    if not isinstance(found, Plant):
+        raise FlightError(f"{type(craft).__name__}.plant returned {_kind(found)}, expected a casadi_gnc.Plant")
+    return found
 
 
 def ask(owner: Any, method: str, *arguments: Any) -> Any:
@@ -22,7 +36,7 @@ def ask(owner: Any, method: str, *arguments: Any) -> Any:
     function: Callable[..., Any] = getattr(owner, method)
     try:
         return function(*arguments)
-    except GncError:
+    except (GncError, MisfitError):
         raise
     except Exception as error:  # whatever an author's code does
         raise LawError(f"{type(owner).__name__}.{method} failed: {_told(error)}") from error
@@ -31,6 +45,8 @@ def ask(owner: Any, method: str, *arguments: Any) -> Any:
 def _told(error: Exception) -> str:
     """Return an exception as a sentence; of CasADi's, the first line that says something."""
     text = str(error).strip()
+    if "truth value" in text:
+        return _ON_SYMBOLS + "".join(guests.told(error).partition("\n  ")[1:])
     if isinstance(error, (RuntimeError, NotImplementedError)) and "\n" in text:
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         sentence = next((line for line in lines if "Wrong number or type" in line or "mismatch" in line), lines[-1])

@@ -6,14 +6,17 @@ of the craft is of the kind that the law models, and the effort it commands is w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law
+from casadi_gnc.missions import asking
+from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.loop import Loop
-from casadi_gnc.missions.scheme import Metric
+from casadi_gnc.missions.scheme import Metric, Scheme
+from casadi_gnc.missions.timing import Timing
 from casadi_gnc.signals import Layout, Signal
 
 if TYPE_CHECKING:
@@ -62,6 +65,34 @@ def _apart(own: Signal, other: Signal, what: str, how: str) -> Iterator[str]:
         yield f"{what} in the frame {own.frame!r}, and it is {how} in {other.frame!r}"
 
 
+def refuse_strangers(mission: Mission) -> None:
+    """Raise `FlightError` where a part of a mission is of another kind: a class in the place of an object."""
+    if not isinstance(mission.schemes, (list, tuple)):
+        raise FlightError(f"schemes is {_given(mission.schemes)}, expected a list of casadi_gnc.Scheme")
+    expected = [("craft", mission.craft, Craft), ("timing", mission.timing, Timing)]
+    expected += [(f"schemes[{i}]", scheme, Scheme) for i, scheme in enumerate(mission.schemes)]
+    laws = [(f"the law of {one.name!r}", one.law, Law) for one in mission.schemes if isinstance(one, Scheme)]
+    for name, value, kind in [*expected, *laws]:
+        if not isinstance(value, kind):
+            raise FlightError(f"{name} is {_given(value)}, expected an object of a casadi_gnc.{kind.__name__}")
+
+
+def _given(value: Any) -> str:
+    return f"the class {value.__name__}" if isinstance(value, type) else f"an object of type {type(value).__name__}"
+
+
+def goals(mission: Mission) -> Mapping[str, Sequence[float]]:
+    """Return what a craft says is regulated; raise `FlightError` where that is no state of its plant."""
+    state, craft = mission.truth.state, type(mission.craft).__name__
+    found: Mapping[str, Sequence[float]] = asking.ask(mission.craft, "regulated", mission)
+    for name, goal in found.items():
+        if name not in state:
+            raise FlightError(f"{craft}.regulated names {name!r}, which is no state; there is {', '.join(state.names)}")
+        if len(goal) != state.signal(name).size:
+            raise FlightError(f"{craft}.regulated gives {len(goal)} numbers of {name}, not {state.signal(name).size}")
+    return found
+
+
 def refuse(mission: Mission) -> None:
     """Raise `FlightError` for parts of a mission that do not fit each other."""
     if not mission.schemes:
@@ -71,7 +102,7 @@ def refuse(mission: Mission) -> None:
         if names.count(name) > 1:
             raise FlightError(f"two schemes of {mission.name} are named {name!r}")
     plant, craft = mission.truth, type(mission.craft).__name__
-    begun = {**mission.craft.start(), **mission.start_from}
+    begun = {**asking.ask(mission.craft, "start"), **mission.start_from}
     if set(begun) != set(plant.state.names):
         told = f"gives {', '.join(begun) or 'nothing'}, and the plant's state is {', '.join(plant.state.names)}"
         raise FlightError(f"{craft}.start {told}; give each of them, and nothing else")

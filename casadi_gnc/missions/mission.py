@@ -17,7 +17,7 @@ from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.guests import GuestFile
-from casadi_gnc.missions import fitting, functions
+from casadi_gnc.missions import asking, fitting, functions
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
 from casadi_gnc.missions.plant import Plant
@@ -105,6 +105,7 @@ class Mission:
     origin: Origin | None = None
 
     def __post_init__(self) -> None:
+        fitting.refuse_strangers(self)
         hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
         held = (
             each if each.law.hold == hold else replace(each, law=replace(each.law, hold=hold)) for each in self.schemes
@@ -117,18 +118,18 @@ class Mission:
     @cached_property
     def truth(self) -> Plant:
         """The plant: what truly moves, and what the sensors say."""
-        return self.craft.plant()
+        return asking.plant_of(self.craft)
 
     @cached_property
     def start(self) -> list[float]:
         """The plant's state at t = 0, in its order."""
-        by_signal = {**self.craft.start(), **self.start_from}
+        by_signal = {**asking.ask(self.craft, "start"), **self.start_from}
         return [float(value) for name in self.truth.state.names for value in _flat(by_signal[name])]
 
     @cached_property
     def target(self) -> Mapping[str, Sequence[float]]:
         """The states that the laws regulate, by name, and the values that they bring them to."""
-        return self.craft.regulated(self)
+        return fitting.goals(self)
 
     @property
     def digest(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
-from casadi_gnc.missions import fitting
+from casadi_gnc.missions import asking, fitting
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission, Origin
@@ -103,8 +103,8 @@ class _Parts:
     def ask(self) -> None:
         """Ask for plant, start and belief."""
         craft = self.craft
-        self.plant, self.believed = craft.plant(), craft.belief()
-        start = craft.start()
+        self.plant, self.believed = asking.plant_of(craft), asking.ask(craft, "belief")
+        start = asking.ask(craft, "start")
         self.known = set(start) == set(self.plant.state.names)  # else the mission says what is wrong
         self.measured: list[float] = []
         if self.known:
@@ -173,7 +173,7 @@ def _scheme(
     """Return a scheme; a `MisfitError` or a `GncError` says what does not fit."""
     own = type(parts.craft).scheme_keys
     keys = own.model_construct(**{name: getattr(table, name) for name in own.model_fields})
-    actuation = parts.craft.actuation(keys)
+    actuation = asking.ask(parts.craft, "actuation", keys)
     why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
     if why:
         told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
