@@ -50,7 +50,8 @@ class Craft(Part):
 
     #: Further keys of a [[scheme]] that flies this craft; `actuation` takes them.
     scheme_keys: ClassVar[type[Part]] = EffortKeys
-    #: A shipped problem that flies this craft, for catalogues; None where one is made without arguments.
+    #: A problem that flies this craft, for catalogues: a shipped one, or the path of a mission file of a package.
+    #: None where a craft is made without arguments.
     example: ClassVar[str | None] = None
 
     def __init__(self, **keys: Any) -> None:
