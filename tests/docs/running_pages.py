@@ -49,7 +49,7 @@ class Section:
     def tools(self) -> list[str]:
         """Programs of the flight targets that its commands need."""
         text = "".join(block.text for block in self.blocks if block.language in ("sh", "python"))
-        needed = re.search(r"cortex-m7|board\.toml", text)
+        needed = re.search(r"--target \S*(cortex-m7|\./board\.toml)|check_target", text)
         return ["arm-none-eabi-gcc", "qemu-system-arm"] if needed else []
 
 
@@ -79,7 +79,7 @@ def run(page: str, title: str, folder: Path, **environment: str) -> None:
             if block.file:
                 _write(block, folder)
             elif block.language == "sh":
-                commands = [line for line in _lines(block.text) if last or _MAKES.match(line)]
+                commands = [line for line in _lines(block.text) if last or _makes(line)]
                 said = "".join(_command(line, folder, environment) for line in commands)
             elif block.language == "python" and last:
                 said = _told([sys.executable, "-W", "error", "-c", block.text], 0, folder, environment)
@@ -96,6 +96,11 @@ def _write(block: Block, folder: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     before = path.read_text(encoding="utf-8") if block.place != "whole" else ""
     path.write_text(block.text + before if block.place == "top" else before + block.text, encoding="utf-8")
+
+
+def _makes(line: str) -> bool:
+    """Return whether later sections stand on what a command writes."""
+    return bool(_MAKES.match(line)) and "--target" not in line and "# exit code" not in line
 
 
 def _lines(text: str) -> list[str]:
