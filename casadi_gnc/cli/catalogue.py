@@ -61,8 +61,9 @@ def crafts(
             typer.echo(f"  makes {_signals(craft['makes'])}; believes in {_or(craft['believes'])}")
             typer.echo(f"  laws that fit: {', '.join(craft['laws']) or 'none that is known'}")
         if craft["example"]:
-            ours = craft["example"] in shipped()
-            typer.echo(f"  example: {'casadi-gnc problems copy ' if ours else ''}{craft['example']}{' .' if ours else ''}")
+            is_ours = craft["example"] in shipped()
+            told = f"casadi-gnc problems copy {craft['example']} ." if is_ours else craft["example"]
+            typer.echo(f"  example: {told}")
         rows = [
             [key["table"], key["name"], "" if key["required"] else "optional", key["meaning"]] for key in craft["keys"]
         ]

@@ -18,9 +18,10 @@ from casadi_gnc.missions.plant import Plant
 from casadi_gnc.signals import Layout
 from casadi_gnc.tables.part import MisfitError
 
-
 #: What Python decides at once is not known of a symbol.
-_ON_SYMBOLS = "Python's if, and, or, min, max cannot decide on symbols; take casadi.if_else or casadi_gnc.mathematics.bounds"
+_ON_SYMBOLS = (
+    "Python's if, and, or, min, max cannot decide on symbols; take casadi.if_else or casadi_gnc.mathematics.bounds"
+)
 
 
 def plant_of(craft: Any) -> Plant:

@@ -15,6 +15,7 @@ and their commands run that write more.
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -71,7 +72,8 @@ def sections(page: str) -> list[Section]:
 
 
 def run(page: str, title: str, folder: Path, **environment: str) -> None:
-    """Run one section of a page in an empty folder, after what those before it write."""
+    """Run one section of a page in an empty folder that has the examples, after what those before it write."""
+    shutil.copytree(ROOT / "examples", folder / "examples", dirs_exist_ok=True)
     for section in sections(page):
         last = section.title == title
         said = None
