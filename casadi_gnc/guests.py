@@ -136,7 +136,7 @@ def run(file: GuestFile, place: Path | None = None) -> ModuleType:
     _KNOWN[file.module] = file
     try:
         exec(compile(file.text, shown, "exec"), vars(module))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[file.module]
         raise GuestError(f"{file.path} cannot be run: {told(error, shown)}{_hint(error, place)}") from error
     return module
@@ -153,7 +153,7 @@ class _Text(importlib.abc.InspectLoader):
         return self._file.text
 
 
-def _hint(error: Exception, place: Path | None) -> str:
+def _hint(error: BaseException, place: Path | None) -> str:
     missing = error.name if isinstance(error, ModuleNotFoundError) and place is not None else None
     if missing and place is not None and (place.parent / f"{missing}.py").is_file():
         return f"\n  {missing}.py lies beside it, but a guest is one file: move what it needs in there, or install it"

@@ -37,7 +37,7 @@ def kept(
         about = {"made_of": "objects", "sha256": mission.digest}
         return {CONTROLLER: saving.to_text(controller)}, about
     taken = {file.path: file.text for file in origin.guests}
-    about = {"file": origin.name, "sha256": origin.digest}
+    about: dict[str, Any] = {"file": origin.name, "sha256": origin.digest}
     if origin.changes:
         about["changes"] = dict(origin.changes)
     if origin.guests:

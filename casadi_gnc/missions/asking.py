@@ -56,7 +56,7 @@ def column(owner: Any, method: str, value: Any, expected: Layout | int, what: st
         raise LawError(f"{name} returned an MX expression, {wanted} of SX; functions of MX have to be expanded")
     if not isinstance(value, (ca.SX, ca.DM, np.ndarray, int, float, np.number)):
         raise LawError(f"{name} returned {_kind(value)}, {wanted}")
-    found = ca.SX(value) if not isinstance(value, np.ndarray) else ca.SX(ca.DM(value))
+    found = ca.SX(value) if isinstance(value, (ca.SX, ca.DM)) else ca.SX(ca.DM(np.asarray(value, dtype=float)))
     shape = found.shape
     if size and (found.numel() != size or (shape[1] != 1 and size > 1)):
         raise LawError(f"{name} returned {shape[0]} x {shape[1]} numbers, {wanted}")

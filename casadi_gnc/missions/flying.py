@@ -93,7 +93,7 @@ def fly(
     }
     period = mission.timing.sample_period
     raised = metrics.statuses(built.tally, carried.tally)
-    values = metrics.read(mission.metrics, built.tally, carried.tally, (total - 1) * period, period)
+    values = metrics.read(tuple(mission.metrics), built.tally, carried.tally, (total - 1) * period, period)
     return Flight(
         mission=mission.name,
         scheme=chosen.name,
@@ -138,7 +138,7 @@ def begin(mission: Mission, built: tapes.Tapes, runner: Engine) -> Carried:
         m=memory,
         actuators=np.zeros(mission.truth.inputs.size),
         good=good,
-        tally=metrics.fresh(mission.metrics, built.tally),
+        tally=metrics.fresh(tuple(mission.metrics), built.tally),
     )
 
 

@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
+from casadi_gnc.errors import LawError
 from casadi_gnc.laws import advance
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.integrators import runge_kutta
@@ -262,23 +263,31 @@ class Loop:
 
     @cached_property
     def row(self) -> Layout:
-        """The columns of a record."""
+        """The columns of a record; raise `LawError` where two of them have one name."""
         effort, plant = self.actuation.named, self.plant
-        return Layout(
-            (
-                Signal("time", 1, "s"),
-                *plant.state.signals,
-                *effort("wanted").signals,
-                *effort("limited").signals,
-                *effort("achieved").signals,
-                *plant.inputs.signals,
-                *plant.outputs.signals,
-                *self.law.outputs.signals,
-                *(signal for each in self.mission.funnels for signal in funnel_signals(self.mission, each).signals),
-                *self.actuation.allocator.report.signals,
-                Signal("status", 1),
-            )
-        )
+        owners = {
+            "time": (Signal("time", 1, "s"),),
+            f"{type(plant).__name__}.state": plant.state.signals,
+            "wanted": effort("wanted").signals,
+            "limited": effort("limited").signals,
+            "achieved": effort("achieved").signals,
+            f"{type(plant).__name__}.inputs": plant.inputs.signals,
+            f"{type(plant).__name__}.outputs": plant.outputs.signals,
+            f"{type(self.law).__name__}.outputs": self.law.outputs.signals,
+            "funnels": tuple(s for each in self.mission.funnels for s in funnel_signals(self.mission, each).signals),
+            "allocator": self.actuation.allocator.report.signals,
+            "status": (Signal("status", 1),),
+        }
+        taken: dict[str, str] = {}
+        for owner, signals in owners.items():
+            for signal in signals:
+                if signal.name in taken:
+                    raise LawError(
+                        f"{owner} names a signal {signal.name!r}, and so does {taken[signal.name]}: a record has one "
+                        "of each; rename it"
+                    )
+                taken[signal.name] = owner
+        return Layout(tuple(signal for signals in owners.values() for signal in signals))
 
     def _watched(self, t: Any, y: Any) -> tuple[dict[str, Any], Any]:
         """Return the walls and the use of the mission's funnels, and whether a signal has left its own."""

@@ -17,7 +17,7 @@ from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.guests import GuestFile
-from casadi_gnc.missions import fitting, functions
+from casadi_gnc.missions import asking, fitting, functions, parts, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
 from casadi_gnc.missions.plant import Plant
@@ -112,23 +112,24 @@ class Mission:
         object.__setattr__(self, "schemes", tuple(held))
         object.__setattr__(self, "funnels", tuple(self.funnels))
         fitting.refuse(self)
+        probing.probe(self)
         object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
 
     @cached_property
     def truth(self) -> Plant:
         """The plant: what truly moves, and what the sensors say."""
-        return self.craft.plant()
+        return parts.plant_of(self.craft)
 
     @cached_property
     def start(self) -> list[float]:
         """The plant's state at t = 0, in its order."""
-        by_signal = {**self.craft.start(), **self.start_from}
+        by_signal = {**parts.start_of(self.craft, self.truth), **self.start_from}
         return [float(value) for name in self.truth.state.names for value in _flat(by_signal[name])]
 
     @cached_property
     def target(self) -> Mapping[str, Sequence[float]]:
         """The states that the laws regulate, by name, and the values that they bring them to."""
-        return self.craft.regulated(self)
+        return asking.ask(self.craft, "regulated", self)
 
     @property
     def digest(self) -> str:

@@ -139,7 +139,7 @@ def _craft(kind: type[Craft], data: dict[str, Any], own: list[str], complaints: 
 
 
 @lru_cache(maxsize=64)
-def scheme_table(kind: type[Craft]) -> type[SchemeTable]:
+def scheme_table(kind: type[Craft]) -> Any:
     """Return the model of a [[scheme]] that flies a craft."""
     return create_model("Scheme", __base__=(SchemeTable, kind.scheme_keys), __doc__=SchemeTable.__doc__)
 
