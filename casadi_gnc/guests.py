@@ -169,11 +169,15 @@ def told(error: BaseException, file: str = "") -> str:
     'ValueError: too small'
     """
     sentence = f"{type(error).__name__}: {error}".rstrip(": ")
+    return sentence + own_lines(error, file)
+
+
+def own_lines(error: BaseException, file: str = "") -> str:
+    """Return where in foreign code an exception came from: a line each, with what stands there."""
     if isinstance(error, SyntaxError):
-        return f"{sentence}\n  {file or error.filename}, line {error.lineno}: {(error.text or '').strip()}"
+        return f"\n  {file or error.filename}, line {error.lineno}: {(error.text or '').strip()}"
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if _theirs(frame.filename, file)]
-    lines = [f"\n  {frame.filename}, line {frame.lineno}, in {frame.name}: {frame.line}" for frame in frames]
-    return sentence + "".join(lines)
+    return "".join(f"\n  {frame.filename}, line {frame.lineno}, in {frame.name}: {frame.line}" for frame in frames)
 
 
 def _theirs(filename: str, file: str) -> bool:

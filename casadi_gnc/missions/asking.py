@@ -29,13 +29,12 @@ def ask(owner: Any, method: str, *arguments: Any) -> Any:
 
 
 def _told(error: Exception) -> str:
-    """Return an exception as a sentence; of CasADi's, the first line that says something."""
+    """Return an exception as a sentence with its author's lines; of CasADi's many lines, the one that says it."""
     text = str(error).strip()
-    if isinstance(error, (RuntimeError, NotImplementedError)) and "\n" in text:
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        sentence = next((line for line in lines if "Wrong number or type" in line or "mismatch" in line), lines[-1])
-        return type(error)(sentence).args[0] + "".join(guests.told(error).partition("\n  ")[1:2])
-    return guests.told(error)
+    if not isinstance(error, (RuntimeError, NotImplementedError)) or "\n" not in text:
+        return guests.told(error)
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return next((line for line in lines if "Wrong number or type" in line), lines[-1]) + guests.own_lines(error)
 
 
 def column(owner: Any, method: str, value: Any, expected: Layout | int, what: str = "") -> Any:
