@@ -63,7 +63,9 @@ def main() -> None:
 
 
 def _end(sentence: str, code: int) -> None:
-    print(sentence, file=sys.stderr)  # noqa: T201
+    from casadi_gnc.system.text import terminal
+
+    print(terminal(sentence), file=sys.stderr)  # noqa: T201
     sys.exit(code)
 
 

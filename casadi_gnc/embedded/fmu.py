@@ -10,16 +10,15 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.host import FLAGS
 from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.package import flight_files, put
-from casadi_gnc.embedded.source import access_tunable, environment
+from casadi_gnc.embedded.source import access_tunable
 from casadi_gnc.errors import CompilerError, PackageError
 from casadi_gnc.signals import Layout
-from casadi_gnc.system import assets, compilers
+from casadi_gnc.system import compilers
+from casadi_gnc.system.templates import template
 
 #: A date for every file of the archive: the same unit has the same bytes on another day.
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -31,9 +30,9 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
     sources = {path: text for path, text in package.items() if path.endswith((".c", ".h"))}
     guid = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32]
     parameters = [place for one in controller.tunables for place in access_tunable(one, "")]
-    wrapper = environment().get_template("fmu.c.j2").render(
+    wrapper = template("fmu.c.j2").render(
         name=options.name,
-        title=controller.title.replace("*/", "* /"),
+        title=controller.title,
         guid=guid,
         period=f"{controller.period:g}",
         period_double=Options(options.name).constant(controller.period),
@@ -41,7 +40,7 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
         outputs=access(controller.outputs, "output."),
         parameters=parameters,
     )  # fmt: skip
-    xml = _xml().render(
+    xml = template("fmu.xml.j2").render(
         name=options.name,
         title=controller.title,
         description=f"scheme {controller.scheme}{', ' + controller.source if controller.source else ''}",
@@ -55,14 +54,6 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
     )
     files = {f"sources/{path}": text for path, text in {"fmu.c": wrapper, **sources}.items()}
     return {"modelDescription.xml": xml, **files, "documentation/LICENSE": package["LICENSE"]}
-
-
-def _xml() -> jinja2.Template:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-    ).get_template("fmu.xml.j2")
 
 
 def _variables(controller: Controller) -> list[dict[str, Any]]:

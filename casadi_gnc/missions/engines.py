@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import casadi as ca
-import jinja2
 import numpy as np
 
 from casadi_gnc.allocation import Allocate, OnlineInFlight, online
@@ -21,6 +20,7 @@ from casadi_gnc.missions.mission import Mission, Scheme
 from casadi_gnc.missions.tapes import Tapes
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers
+from casadi_gnc.system.templates import template
 
 
 @dataclass(eq=False)
@@ -61,14 +61,8 @@ _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] *
 
 def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc") -> str:
     """Return the C of a whole flight: every tape and the loop over them."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
     plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
-    return environment.get_template("flight.c.j2").render(
+    return template("flight.c.j2").render(
         title=f"{mission.name}, scheme {scheme.name}",
         mode=timing.mode,
         maths=maths,

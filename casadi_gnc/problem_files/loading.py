@@ -16,6 +16,7 @@ from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files import building, schema, toml_place
 from casadi_gnc.problem_files.changing import changed
 from casadi_gnc.system import assets
+from casadi_gnc.system.text import refused
 
 
 def shipped() -> list[str]:
@@ -48,6 +49,14 @@ def read(problem: str | Path) -> tuple[Path, str, dict[str, Any]]:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
+    character = refused(text)  # in a comment too: the file travels with the packages that are made of it
+    if character:
+        number = next(k for k, line in enumerate(text.split("\n"), 1) if refused(line))
+        raise ProblemError(
+            f"holds the character {character}, which is invisible and can change what a reader takes the rest for; "
+            "leave it out",
+            f"{path.name}, line {number}",
+        )
     try:
         return path, text, tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError) as error:

@@ -17,6 +17,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 from casadi_gnc.laws import LAWS, Law, gains_of
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.missions.mission import MetricKind
+from casadi_gnc.system.text import refused
 from casadi_gnc.tables import matrices
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -42,6 +43,17 @@ class Part(BaseModel):
     """Base of all parts of a file: unknown keys, infinities, NaN and numbers as text are refused."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _can_be_read(cls, value: Any) -> Any:
+        for text in value if isinstance(value, list) else [value]:
+            if isinstance(text, str) and (character := refused(text)):
+                raise ValueError(
+                    f"holds the character {character}, which is invisible and can change what a reader, a terminal or "
+                    "a compiler takes the rest for; leave it out"
+                )
+        return value
 
 
 class Orientation(Part):
