@@ -1,4 +1,4 @@
-"""Texts of a mission reach packages and units as texts, whatever they hold; files with invisible characters are refused.
+"""Texts of a mission reach packages and units as texts, whatever they hold; invisible characters are refused.
 
 The attack of old: a title with a backslash before a line's end joins `*` and `/`, the comment ends, and what follows is
 compiled. Truth: compilers that know trigraphs, an XML parser, and an enumerator that must stay the only declaration.
@@ -104,7 +104,8 @@ def test_texts_stay_in_their_comments(attack, controller, tmp_path):
     root = ElementTree.fromstring(files["modelDescription.xml"])
     assert {one.tag for one in root.iter()} <= {
         "fmiModelDescription", "CoSimulation", "SourceFiles", "File", "UnitDefinitions", "Unit", "DefaultExperiment",
-        "ModelVariables", "ScalarVariable", "Real", "Integer", "ModelStructure", "Outputs", "InitialUnknowns", "Unknown",
+        "ModelVariables", "ScalarVariable", "Real", "Integer", "ModelStructure", "Outputs", "InitialUnknowns",
+        "Unknown",
     }  # fmt: skip
 
 

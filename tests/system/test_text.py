@@ -1,4 +1,4 @@
-"""Any text in any language means nothing but itself. Truth: compilers, parsers, a shell, make and CMake read it back."""
+"""Any text in any language means nothing but itself. Truth: compilers, parsers, a shell, make and CMake."""
 
 import html.parser
 import shutil
@@ -15,10 +15,11 @@ from casadi_gnc.system import text
 
 #: Pieces that end comments and strings, join lines, or turn them around, beside single characters of all of Unicode.
 PIECES = [
-    "*/", "/*", "*", "/", "\\", "??/", "??", "\n", "\r", "\r\n", "\t", "\v", "\f", "\x85", "\u2028", "\u2029", "\x1b[2J", "\0",
+    "*/", "/*", "*", "/", "\\", "??/", "??", "\n", "\r", "\r\n", "\t", "\v", "\f", "\x85", "\u2028", "\u2029",
+    "\x1b[2J", "\0",
     "\u202e", "\u2066", "\u2069", "\ufeff", "\ufffe", "\ud800", "\U000e0041", "'", '"', "<", ">", "&", "&#0;", "]]>",
-    "<!--", "<script>", "`", "``", "|", "#", "$", "$(touch x)", "${x}", "%n", "//", "[a](b)", "![a](b)", "_", "~~", "---",
-    "===", "1. ", "- ", "+ ", "> ", "@x@", ";", "word", " ",
+    "<!--", "<script>", "`", "``", "|", "#", "$", "$(touch x)", "${x}", "%n", "//", "[a](b)", "![a](b)", "_", "~~",
+    "---", "===", "1. ", "- ", "+ ", "> ", "@x@", ";", "word", " ",
 ]  # fmt: skip
 TEXTS = st.lists(
     st.one_of(st.sampled_from(PIECES), st.characters(categories=None), st.text(max_size=3)), max_size=8
@@ -43,7 +44,7 @@ def language(request):
 @SLOW
 @given(texts=MANY)
 def test_no_comment_ends_early(language, texts):
-    """One comment a text, in every place that templates put one; an enumerator after each says on which line it stands."""
+    """A comment a text, in every place that templates put one; an array after each says on which line it stands."""
     lines, expected = [], []
     for k, one in enumerate(texts):
         said = text.c_comment(one)
