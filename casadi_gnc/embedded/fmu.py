@@ -92,11 +92,11 @@ def _variable(
         "name": name,
         "causality": causality,
         "variability": variability,
-        "initial": "exact" if causality != "input" else "",
+        "initial": {"input": "", "output": "calculated"}.get(causality, "exact"),
         "description": note,
         "unit": "" if unit == "-" else unit,
         "type": kind,
-        "start": start,
+        "start": None if causality == "output" else start,
         "low": None,
         "high": None,
     }
