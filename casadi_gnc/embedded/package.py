@@ -56,7 +56,7 @@ def replay_files(
 ) -> dict[str, str]:
     """Return the replay program, its vectors (rows of words) and the files that build it."""
     units = [f"{options.name}.c", *allocator_files(controller, options)]
-    about = {"name": options.name, "units": units}
+    about = {"name": options.name, "units": units, "bits": 64 if options.real == "double" else 32}
     vectors = {"inputs": _rows(inputs), "outputs": _rows(outputs), "steps": len(inputs), "spoiled": spoiled}
     return {
         "test/replay.h": replay_header(controller, options, len(inputs)),

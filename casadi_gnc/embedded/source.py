@@ -40,9 +40,9 @@ _NOTES = {
 
 def runtime_files(controller: Controller, options: Options) -> list[str]:
     """Return the files of `codegen/runtime` that the package carries."""
-    maths = (
-        [] if options.maths == "libm" else ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
-    )
+    maths = ["gnc_arithmetic.h"]
+    if options.maths == "gnc":
+        maths += ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
     if controller.allocation is None:
         return maths
     return [*maths, "gnc_allocate.h", "gnc_allocate_internal.h"]

@@ -21,6 +21,7 @@
 #endif
 
 #include "gnc_allocate.h"
+#include "gnc_arithmetic.h"
 
 enum {
     N = GNC_ALLOC_N,                        /* actuators */

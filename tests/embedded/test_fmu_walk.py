@@ -142,7 +142,7 @@ def test_walk(unit, seed):
     fresh = Model(tuple(fmu[0].getReal(unit.gains)))
     model, phase = [fresh, fresh], ["instantiated", "instantiated"]
     kept = []  # (state of the unit or its bytes, model)
-    done = {name: 0 for name in ("step", "set", "take", "give", "store", "reset", "refused")}
+    done = dict.fromkeys(("step", "set", "take", "give", "store", "reset", "refused"), 0)
     for _ in range(150):
         who = int(rng.integers(2))
         one = fmu[who]
