@@ -71,6 +71,11 @@ def _variables(controller: Controller) -> list[dict[str, Any]]:
         )
         for name, value in zip(layout_names, one.default, strict=True):
             rows.append(_variable(name, "parameter", "tunable", one.note, one.unit, "Real", repr(value)))
+    names = [row["name"] for row in rows]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise PackageError(
+            f"the unit would have two variables {twice[0]!r}, as input, output or parameter; rename one of the signals"
+        )
     for i, row in enumerate(rows, 1):
         row["index"] = i
     return rows
