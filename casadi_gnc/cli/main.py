@@ -59,7 +59,8 @@ def main() -> None:
         sys.exit(0)
     except OSError as error:
         _silence()
-        _end(f"casadi-gnc: cannot write the output: {error.strerror or error}", 2)
+        what = f"the output {error.filename!r}" if error.filename else "the output"
+        _end(f"casadi-gnc: cannot write {what}: {error.strerror or error}", 2)
 
 
 def _end(sentence: str, code: int) -> None:

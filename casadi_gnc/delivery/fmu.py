@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -14,6 +13,7 @@ from casadi_gnc.embedded.controller import Options
 from casadi_gnc.errors import OutputError, PackageError
 from casadi_gnc.problem_files.loading import load, read
 from casadi_gnc.system.files import prepare_folder, write_beside
+from casadi_gnc.system.folders import workshop
 
 _REALS = {"float64": "double", "float32": "float"}
 
@@ -51,6 +51,6 @@ def generate_fmu(
     controller = describe(mission, scheme, tunable)
     files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration)
     prepare_folder(target.parent)
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        write_beside(target, lambda place: fmu.build(files, options, Path(workshop), place))
+    with workshop() as shop:
+        write_beside(target, lambda place: fmu.build(files, options, shop, place))
     return target

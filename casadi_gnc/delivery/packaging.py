@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -210,7 +209,7 @@ def _on_host(
     folder: Path, controller: Controller, options: Options, inputs: np.ndarray, outputs: np.ndarray
 ) -> list[dict[str, Any]]:
     found = []
-    for compiler in _different(compilers.available() or [compilers.find()]):
+    for compiler in compilers.different(compilers.available() or [compilers.find()]):
         replayed = HostPackage(folder, options.name, compiler=compiler).replay(inputs, outputs.shape[1])
         lines = compare.differences(replayed, outputs, controller.outputs)
         found.append(_comparison(f"host, {compiler.version}, against the shipped flight", lines, exact=True))
@@ -231,15 +230,9 @@ def _on_host(
     return found
 
 
-def _different(found: list[compilers.Compiler]) -> list[compilers.Compiler]:
-    """Return compilers of different versions."""
-    return list({compiler.version: compiler for compiler in reversed(found)}.values())[::-1]
-
-
 def _rebuilt(controller: Controller, options: Options, inputs: np.ndarray, flags: tuple[str, ...]) -> np.ndarray:
     """Return the output words of the controller made anew with other options."""
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        folder = Path(workshop)
+    with compilers.workshop() as folder:
         files = package.flight_files(controller, options)
         files["test/replay.h"] = package.replay_header(controller, options, len(inputs))
         package.put(folder, files)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -15,7 +14,7 @@ from casadi_gnc.embedded.host import FLAGS
 from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.package import flight_files, put
 from casadi_gnc.embedded.source import access_tunable
-from casadi_gnc.errors import CompilerError, PackageError
+from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout
 from casadi_gnc.system import compilers
 from casadi_gnc.system.templates import template
@@ -132,22 +131,9 @@ def build(files: dict[str, str], options: Options, workshop: Path, target: Path)
     library = workshop / "binaries" / folder / f"{options.name}{'.dll' if folder == 'win64' else '.so'}"
     library.parent.mkdir(parents=True)
     sources = [str(path) for path in sorted((workshop / "sources").glob("*.c"))]
-    hidden = ["-fPIC", "-shared", "-fvisibility=hidden"]
-    command = [
-        *compiler.command,
-        *FLAGS,
-        "-O2",
-        *hidden,
-        f"-I{workshop / 'sources'}",
-        "-o",
-        str(library),
-        *sources,
-        "-lm",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    if done.returncode:
-        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
-        raise CompilerError(f"{compiler.name} refused the unit: {complaint.strip()}")
+    include = f"-I{workshop / 'sources'}"
+    words = [*FLAGS, "-O2", "-fPIC", "-shared", "-fvisibility=hidden", include, "-o", str(library), *sources, "-lm"]
+    compilers.compile_in(workshop, compiler, words, "the unit")
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(path for path in workshop.rglob("*") if path.is_file()):
             entry = zipfile.ZipInfo(path.relative_to(workshop).as_posix(), _DATE)
