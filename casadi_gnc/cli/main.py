@@ -47,6 +47,10 @@ app.command("doctor")(doctor.doctor)
 
 def main() -> None:
     """Run the command line; turn what a user can put right into one sentence on stderr."""
+    # A terminal that lacks a letter gets its number, not a traceback.
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
         sys.stdout.flush()

@@ -28,6 +28,8 @@ STEPS, SPOILED = 1024, 24
 #: Most samples of one; more would make files of hundreds of megabytes.
 MOST_STEPS = 100_000
 _REALS = {"float64": "double", "float32": "float"}
+#: What a manifest must say for a package to be verified.
+_ABOUT = {"name": str, "title": str, "scheme": str, "real": str, "tunable": list}
 
 
 def generate(
@@ -133,6 +135,10 @@ def verify(folder: Path, target: Sequence[str] = ("host",)) -> dict[str, Any]:
         For a folder that is no package, and tools that are missing or refuse.
     """
     about = package.read_manifest(folder)
+    if lacking := [key for key, kind in _ABOUT.items() if not isinstance(about.get(key), kind)]:
+        raise PackageError(f"{folder} is no package: its {package.MANIFEST} does not say {', '.join(lacking)}")
+    if about["real"] not in _REALS:
+        raise PackageError(f"{folder} is no package of this version: its numbers are {about['real']!r}")
     boards = [targets.find(one) for one in dict.fromkeys(target) if one != "host"]
     for board in boards:
         board.need()

@@ -223,7 +223,10 @@ def test_manifest_says_what_it_was_made_of():
     assert package.edited(folder) == []
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"format": 7}', '{"format": 1, "files": 3}'])
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", '{"format": 7}', '{"format": 1, "files": 3}', '{"format": 1, "files": {}, "name": 3}', "\\xff"],
+)
 def test_folder_that_is_no_package(text, tmp_path):
     with pytest.raises(PackageError, match="is no package"):
         verify(tmp_path)
