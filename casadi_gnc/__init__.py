@@ -1,11 +1,11 @@
 """casadi-gnc: spacecraft guidance, navigation and control from CasADi symbols to flight C.
 
->>> import casadi_gnc
->>> mission = casadi_gnc.load("huang2020/detumble")
->>> flight = casadi_gnc.fly(mission, "damping_pinv")
+>>> import casadi_gnc as gnc
+>>> flight = gnc.fly("huang2020/detumble", "damping_pinv")
 >>> flight["rate"].shape, flight.unit("rate")
 ((15001, 3), 'rad/s')
 
+What a craft, a law or a check of your own is derived from, and what flies, checks and delivers it, is here.
 Names are imported when they are first used, so that importing the package costs little.
 """
 
@@ -15,25 +15,101 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from casadi_gnc.checks import Check
+    from casadi_gnc.delivery.fmu import generate_fmu
+    from casadi_gnc.delivery.packaging import generate
+    from casadi_gnc.delivery.verifying import verify
     from casadi_gnc.errors import GncError
+    from casadi_gnc.laws import FORCE, FORCE_AND_TORQUE, TORQUE, Law, gain, option
+    from casadi_gnc.missions.actuation import Actuation, Actuators
+    from casadi_gnc.missions.craft import Craft, EffortKeys
     from casadi_gnc.missions.flight import Flight
-    from casadi_gnc.missions.flying import fly, fly_all
     from casadi_gnc.missions.mission import Mission
-    from casadi_gnc.problem_files.loading import load, shipped
+    from casadi_gnc.missions.panel import Panel
+    from casadi_gnc.missions.plant import Plant
+    from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
+    from casadi_gnc.missions.timing import Noise, Timing
+    from casadi_gnc.problem_files.by_name import check, fly, fly_all
+    from casadi_gnc.problem_files.document import shipped
+    from casadi_gnc.problem_files.loading import load
+    from casadi_gnc.signals import Layout, Signal
     from casadi_gnc.status import StepStatus
+    from casadi_gnc.tables.part import Part, table
 
-__all__ = ["Flight", "GncError", "Mission", "StepStatus", "fly", "fly_all", "load", "shipped"]
-
+#: Where each name lives.
 _HOMES = {
+    "Actuation": "missions.actuation",
+    "Actuators": "missions.actuation",
+    "Check": "checks",
+    "Craft": "missions.craft",
+    "EffortKeys": "missions.craft",
+    "FORCE": "laws",
+    "FORCE_AND_TORQUE": "laws",
     "Flight": "missions.flight",
+    "Funnel": "missions.scheme",
     "GncError": "errors",
+    "Law": "laws",
+    "Layout": "signals",
+    "Metric": "missions.scheme",
     "Mission": "missions.mission",
+    "Noise": "missions.timing",
+    "Panel": "missions.panel",
+    "Part": "tables.part",
+    "Plant": "missions.plant",
+    "Scheme": "missions.scheme",
+    "Signal": "signals",
     "StepStatus": "status",
-    "fly": "missions.flying",
-    "fly_all": "missions.flying",
+    "TORQUE": "laws",
+    "Timing": "missions.timing",
+    "check": "problem_files.by_name",
+    "fly": "problem_files.by_name",
+    "fly_all": "problem_files.by_name",
+    "gain": "laws",
+    "generate": "delivery.packaging",
+    "generate_fmu": "delivery.fmu",
     "load": "problem_files.loading",
-    "shipped": "problem_files.loading",
+    "option": "laws",
+    "shipped": "problem_files.document",
+    "table": "tables.part",
+    "verify": "delivery.verifying",
 }
+
+__all__ = [
+    "FORCE",
+    "FORCE_AND_TORQUE",
+    "TORQUE",
+    "Actuation",
+    "Actuators",
+    "Check",
+    "Craft",
+    "EffortKeys",
+    "Flight",
+    "Funnel",
+    "GncError",
+    "Law",
+    "Layout",
+    "Metric",
+    "Mission",
+    "Noise",
+    "Panel",
+    "Part",
+    "Plant",
+    "Scheme",
+    "Signal",
+    "StepStatus",
+    "Timing",
+    "check",
+    "fly",
+    "fly_all",
+    "gain",
+    "generate",
+    "generate_fmu",
+    "load",
+    "option",
+    "shipped",
+    "table",
+    "verify",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -29,6 +29,7 @@ class Check:
     consequence, remedy : one sentence each: what happens then, what to do.
     source : equation, paper or method the limit comes from.
     at_least : whether the value must be at least the limit, instead of at most.
+    strict : whether the limit itself is no longer good.
     scheme : name of the scheme it is about, "" if about all.
     """
 
@@ -42,6 +43,7 @@ class Check:
     source: str = ""
     at_least: bool = False
     scheme: str = ""
+    strict: bool = False
 
     @property
     def margin(self) -> float:
@@ -51,7 +53,7 @@ class Check:
     @property
     def holds(self) -> bool:
         """Whether the limit is kept; a value that is no number keeps none."""
-        return not math.isnan(self.value) and self.margin >= 0
+        return not math.isnan(self.value) and (self.margin > 0 if self.strict else self.margin >= 0)
 
     @property
     def verdict(self) -> Verdict:

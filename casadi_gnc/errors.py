@@ -20,6 +20,21 @@ class ProblemError(GncError):
         self.place = place
         super().__init__(f"{place}: {message}" if place else message)
 
+    @classmethod
+    def several(cls, told: list[tuple[str, str]]) -> ProblemError:
+        """Return one error that tells several defects, (message, place) each, a line each."""
+        made = cls("\n".join(f"{place}: {message}" if place else message for message, place in told))
+        made.place = told[0][1]
+        return made
+
+
+class RegistryError(GncError):
+    """Report a name that stands for nothing, for two things, or for one of another kind."""
+
+
+class GuestError(GncError):
+    """Report code of a user's own that cannot be found, run or used; its own lines are in the message."""
+
 
 class PrinterError(GncError):
     """Report a symbolic function that cannot be printed as C."""
@@ -39,6 +54,10 @@ class AllocationError(GncError):
 
 class LawError(GncError):
     """Report a gain outside its range."""
+
+
+class CheckError(GncError):
+    """Report a check of a user's own that failed."""
 
 
 class OutputError(GncError):

@@ -10,10 +10,12 @@ import keyword
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
+
+Kind = Literal["", "mrp", "rate", "wheel_speed"]
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,8 @@ class Signal:
     unit : SI unit, ``""`` for dimensionless.
     frame : frame in which a vector is resolved, ``""`` for scalars and lists.
     limit : largest magnitude of an element that can be true; beyond it a measurement is rejected.
+    kind : what it physically is, for whoever must know and cannot read names: "mrp", "rate" (of the body),
+        "wheel_speed"; "" where nobody needs to.
     """
 
     name: str
@@ -34,6 +38,7 @@ class Signal:
     unit: str = ""
     frame: str = ""
     limit: float = math.inf
+    kind: Kind = ""
 
     def __post_init__(self) -> None:
         if not self.name.isidentifier() or keyword.iskeyword(self.name):
@@ -80,6 +85,10 @@ class Layout:
             if signal.name == name:
                 return signal
         raise KeyError(f"no signal {name!r}; there is {', '.join(self.names) or 'none'}")
+
+    def of_kind(self, kind: Kind) -> tuple[Signal, ...]:
+        """Return the signals of a kind."""
+        return tuple(signal for signal in self.signals if signal.kind == kind)
 
     def place(self, name: str) -> slice:
         """Return the rows that a signal occupies."""

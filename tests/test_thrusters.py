@@ -11,7 +11,7 @@ import casadi_gnc
 from casadi_gnc.mechanics.attitude import frame_rotation
 from casadi_gnc.mechanics.rigid_body import inverse3
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry, corner_errors
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
 R_SC = [[0.63708, 0.63708, -0.43388], [-0.08785, 0.61925, 0.78026], [0.76577, -0.45897, 0.45048]]
 CORNERS = {  # Table 3: position of the three thrusters of each corner; z of the last corrected
@@ -51,7 +51,7 @@ def rotation():
 
 @pytest.fixture(scope="module")
 def geometry(rotation):
-    _, _, data = read("huang2020/detumble")
+    data = read("huang2020/detumble").data
     mounted = data["spacecraft"]["thrusters"]
     return ThrusterGeometry.from_rows(mounted["positions_m"], mounted["directions"]).seen_from(rotation, [0.05] * 3)
 
@@ -80,7 +80,7 @@ def test_orbit_engine_torque():
 
 def test_corner_errors_are_the_change_of_effectiveness(rotation, geometry):
     """dA F = D E F for a centre of mass that really is elsewhere."""
-    _, _, data = read("huang2020/detumble")
+    data = read("huang2020/detumble").data
     mounted = ThrusterGeometry.from_rows(*(data["spacecraft"]["thrusters"][k] for k in ("positions_m", "directions")))
     errors = corner_errors(rotation, [-5e-3] * 3, [5e-3, 5e-3, 7e-3])
     shifts = [(x, y, z) for x in (-5e-3, 5e-3) for y in (-5e-3, 5e-3) for z in (-5e-3, 7e-3)]

@@ -24,7 +24,7 @@ class Allocator:
     Parameters
     ----------
     problem : what stays the same.
-    backend : name of a back end, see `casadi_gnc.allocation.backends`.
+    backend : name of a back end, or one itself, see `casadi_gnc.allocation.backends`.
     accuracy : "low", "mid" or "high": to which gap an answer counts as certified.
     options : of the back end; an unknown one is an error.
 
@@ -35,12 +35,12 @@ class Allocator:
     """
 
     def __init__(
-        self, problem: AllocationProblem, backend: str = "clarabel", *, accuracy: Accuracy = "mid", **options: Any
+        self, problem: AllocationProblem, backend: Any = "clarabel", *, accuracy: Accuracy = "mid", **options: Any
     ) -> None:
         if accuracy not in ACCURACIES:
             raise AllocationError(f"accuracy {accuracy!r} is not known; there is {', '.join(ACCURACIES)}")
         self._module = backends.module(backend)
-        lacking = backends.missing(backend)
+        lacking, backend = backends.missing(backend), backends.name_of(backend)
         if lacking:
             raise AllocationError(f"back end {backend!r} needs {', '.join(lacking)}, which is not installed")
         self.backend, self._accuracy, self._options = backend, ACCURACIES[accuracy], options

@@ -51,6 +51,23 @@ class Direct:
 #: What one sample of an allocation leaves in the record.
 CERTIFICATE = Layout((Signal("duality_gap"), Signal("allocation_cost"), Signal("worst_vertex"), Signal("iterations")))
 
+#: What the end of an allocation raises in flight; the generated C does the same (allocation_status.j2).
+RAISED = {
+    AllocationStatus.OPTIMAL: StepStatus(0),
+    AllocationStatus.AT_ROUNDING: StepStatus(0),
+    AllocationStatus.NOT_CERTIFIED: StepStatus.ALLOCATION_INEXACT,
+    AllocationStatus.FAILED: StepStatus.ALLOCATION_FAILED,
+    AllocationStatus.BAD_COMMAND: StepStatus.ALLOCATION_FAILED,
+}
+#: Statuses by their codes in gnc_allocate.h.
+CODES = (
+    AllocationStatus.OPTIMAL,
+    AllocationStatus.AT_ROUNDING,
+    AllocationStatus.NOT_CERTIFIED,
+    AllocationStatus.BAD_COMMAND,
+    AllocationStatus.FAILED,
+)
+
 #: (command, previous, lower, upper) -> (forces inside the box, status bits, numbers of the report)
 Allocate = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, int, np.ndarray]]
 
@@ -62,11 +79,11 @@ class SolverInFlight:
     Parameters
     ----------
     problem : what is allocated.
-    backend : its name.
+    backend : its name, or a back end itself.
     """
 
     problem: AllocationProblem
-    backend: str = "clarabel"
+    backend: Any = "clarabel"
     report = CERTIFICATE
 
     def start(self) -> Allocate:
@@ -75,13 +92,8 @@ class SolverInFlight:
 
         def allocate(command: Any, previous: Any, lower: Any, upper: Any) -> tuple[np.ndarray, int, np.ndarray]:
             answer = allocator.solve(command, previous, (np.array(lower), np.array(upper)))
-            status = StepStatus(0)
-            if answer.status is AllocationStatus.NOT_CERTIFIED:
-                status = StepStatus.ALLOCATION_INEXACT
-            elif not answer.status.is_certified:
-                status = StepStatus.ALLOCATION_FAILED
             report = [answer.duality_gap, answer.objective, float(answer.worst_vertex), float(answer.iterations)]
-            return answer.forces, int(status), np.array(report)
+            return answer.forces, int(RAISED[answer.status]), np.array(report)
 
         return allocate
 
@@ -115,13 +127,6 @@ class OnlineInFlight:
         def allocate(command: Any, previous: Any, lower: Any, upper: Any) -> tuple[np.ndarray, int, np.ndarray]:
             raw = solver.solve(command, previous, lower, upper)
             report = [raw.gap, raw.objective, float(raw.worst_vertex), float(raw.iterations)]
-            return raw.forces, int(online_status(raw.status)), np.array(report)
+            return raw.forces, int(RAISED[CODES[raw.status]]), np.array(report)
 
         return allocate
-
-
-def online_status(code: int) -> StepStatus:
-    """Return the step status that belongs to a status code of `gnc_allocate.h`."""
-    if code <= 1:  # optimal, or at the rounding floor
-        return StepStatus(0)
-    return StepStatus.ALLOCATION_INEXACT if code == 2 else StepStatus.ALLOCATION_FAILED

@@ -1,10 +1,9 @@
 """Reaction wheels as actuators, alone or beside thrusters.
 
-The command of a wheel is its acceleration x_i [rad/s^2]; the effort is the torque C J_w x that
-accelerates the body, with the spin axes in the columns of C. (The sign is the plant's: a wheel that
-is spun up turns the body the other way, u = -C J_w x there.) Speed limits become bounds on the
-acceleration of the next sample, and a preferred acceleration in the null space brings wheel speeds
-back without torque.
+The command of a wheel is its acceleration x_i [rad/s^2]; the effort is the torque on the body, -C J_w x, with
+the spin axes in the columns of C (`casadi_gnc.mechanics.reaction_wheels`, the one convention). Speed limits
+become bounds on the acceleration of the next sample, and a preferred acceleration in the null space brings
+wheel speeds back without torque.
 
 Source: Huang and Duan (2019), doi:10.1109/ACCESS.2019.2949285, with wheel axes as free vectors
 (C = R Cbar): a spin axis has a direction and no place, so no mass centre enters.
@@ -12,7 +11,7 @@ Source: Huang and Duan (2019), doi:10.1109/ACCESS.2019.2949285, with wheel axes 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 
 import casadi as ca
@@ -21,63 +20,55 @@ from scipy.linalg import null_space
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.mechanics.reaction_wheels import acceleration_bounds
+from casadi_gnc.mechanics.reaction_wheels import WheelArray, acceleration_bounds
 
 
-@dataclass(frozen=True, eq=False)
-class WheelSet:
-    """Describe N wheels.
+def wheel_problem(wheels: WheelArray, **other: object) -> AllocationProblem:
+    """Return the allocation of torque on the body [N m] to wheel accelerations [rad/s^2].
 
     Parameters
     ----------
-    axes : C, (3, N), unit spin axes, body frame.
-    inertia : J_w, of each wheel about its axis, [kg m^2].
-    max_torque : of each motor, [N m].
-    max_speed : [rad/s].
+    wheels : with axes of length 1 and a largest acceleration.
+    other : weights, as for `AllocationProblem`.
+
+    Raises
+    ------
+    AllocationError
+        For axes that are no unit vectors, or wheels without a largest acceleration.
     """
+    axes = np.array(ca.DM(wheels.axes))
+    if axes.shape[0] != 3 or not np.allclose(np.linalg.norm(axes, axis=0), 1, atol=1e-4):
+        raise AllocationError(f"wheel axes have shape {axes.shape}, expected 3 rows and columns of length 1")
+    if not np.isfinite(wheels.max_acceleration):
+        raise AllocationError("the wheels have no largest acceleration; give max_acceleration")
+    most, effectiveness = wheels.max_acceleration, np.array(ca.DM(wheels.effectiveness))
+    return AllocationProblem(effectiveness, lower=-most, upper=most, **other)  # type: ignore[arg-type]
 
-    axes: np.ndarray
-    inertia: float
-    max_torque: float
-    max_speed: float
 
-    def __post_init__(self) -> None:
-        axes = np.array(self.axes, dtype=float)
-        if axes.ndim != 2 or axes.shape[0] != 3 or not np.allclose(np.linalg.norm(axes, axis=0), 1, atol=1e-4):
-            raise AllocationError(f"wheel axes have shape {axes.shape}, expected 3 rows and columns of length 1")
-        for name in ("inertia", "max_torque", "max_speed"):
-            if not getattr(self, name) > 0:
-                raise AllocationError(f"{name} is {getattr(self, name)}, expected a positive number")
-        object.__setattr__(self, "axes", axes)
+def at_speed(
+    wheels: WheelArray, problem: AllocationProblem, speed: np.ndarray, period: float, *, desaturation: float = 0.0
+) -> AllocationProblem:
+    """Return the problem of one sample at given wheel speeds.
 
-    def problem(self, **other: object) -> AllocationProblem:
-        """Return the allocation of torque [N m] to wheel accelerations [rad/s^2]; `other` as weights."""
-        largest = self.max_torque / self.inertia
-        return AllocationProblem(self.axes * self.inertia, lower=-largest, upper=largest, **other)  # type: ignore[arg-type]
-
-    def at_speed(
-        self, problem: AllocationProblem, speed: np.ndarray, period: float, *, desaturation: float = 0.0
-    ) -> AllocationProblem:
-        """Return the problem of one sample at given wheel speeds.
-
-        Parameters
-        ----------
-        problem : of `problem()`, perhaps with uncertainty or faults.
-        speed : (N,), [rad/s].
-        period : sample period, [s]: no wheel may pass its speed limit within it.
-        desaturation : rate [1/s] at which speeds are brought to zero through the null space of the
-            axes, where they make no torque; 0 leaves them.
-        """
-        speed = np.asarray(speed, dtype=float)
-        if speed.shape != (problem.count,) or not period > 0:
-            raise AllocationError(f"speed has shape {speed.shape}, expected ({problem.count},); period {period} > 0")
-        box = (ca.DM(problem.lower), ca.DM(problem.upper))
-        reachable = acceleration_bounds(ca.DM(speed), self.max_speed, period, *box)
-        lower, upper = (np.array(bound).ravel() for bound in reachable)
-        turning = problem.lower < problem.upper  # dead and stuck wheels take no part
-        free, wanted = null_space(problem.effectiveness[:, turning]), np.zeros(problem.count)
-        wanted[turning] = -desaturation * free @ (free.T @ speed[turning])
-        return replace(problem, lower=lower, upper=upper, preferred=wanted)
+    Parameters
+    ----------
+    wheels : their largest speed counts.
+    problem : of `wheel_problem`, perhaps with uncertainty or faults.
+    speed : (N,), [rad/s].
+    period : sample period, [s]: no wheel may pass its speed limit within it.
+    desaturation : rate [1/s] at which speeds are brought to zero through the null space of the
+        axes, where they make no torque; 0 leaves them.
+    """
+    speed = np.asarray(speed, dtype=float)
+    if speed.shape != (problem.count,) or not period > 0:
+        raise AllocationError(f"speed has shape {speed.shape}, expected ({problem.count},); period {period} > 0")
+    box = (ca.DM(problem.lower), ca.DM(problem.upper))
+    reachable = acceleration_bounds(ca.DM(speed), wheels.max_speed, period, *box)
+    lower, upper = (np.array(bound).ravel() for bound in reachable)
+    turning = problem.lower < problem.upper  # dead and stuck wheels take no part
+    free, wanted = null_space(problem.effectiveness[:, turning]), np.zeros(problem.count)
+    wanted[turning] = -desaturation * free @ (free.T @ speed[turning])
+    return replace(problem, lower=lower, upper=upper, preferred=wanted)
 
 
 def combine(*problems: AllocationProblem) -> AllocationProblem:

@@ -12,7 +12,7 @@ from casadi_gnc.benchmarks.families import random_family
 from casadi_gnc.benchmarks.outside import Samples, boxed, read_commands, read_outside
 from casadi_gnc.benchmarks.sets import AllocationFamily, load_set
 from casadi_gnc.errors import BenchmarkError
-from casadi_gnc.problem_files import loading
+from casadi_gnc.problem_files import document
 from casadi_gnc.problem_files.allocation_file import load_allocation
 
 
@@ -49,11 +49,13 @@ def _families(problem: str, samples: int | None) -> list[Family]:
 
 
 def _is_shipped(problem: str) -> bool:
-    return problem in loading.shipped() or f"benchmarks/{problem}" in loading.shipped()
+    return problem in document.shipped() or f"benchmarks/{problem}" in document.shipped()
 
 
 def _kind(name: str) -> str:
-    return str(loading.read(f"benchmarks/{name}" if f"benchmarks/{name}" in loading.shipped() else name)[2].get("kind"))
+    return str(
+        document.read(f"benchmarks/{name}" if f"benchmarks/{name}" in document.shipped() else name).data.get("kind")
+    )
 
 
 def _of_problem(name: str, samples: int | None) -> Family:

@@ -15,8 +15,9 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from casadi_gnc.errors import BenchmarkError
-from casadi_gnc.problem_files import loading
-from casadi_gnc.problem_files.schema import Format, NonNegative, Part, Positive
+from casadi_gnc.problem_files.document import read_kind, shipped
+from casadi_gnc.problem_files.mission_tables import Format
+from casadi_gnc.tables.part import NonNegative, Part, Positive
 
 FamilyName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,40}$", description="small letters, digits and _")]
 
@@ -97,8 +98,8 @@ def load_set(name: str | Path, contest: str) -> tuple[str, BenchmarkModel, Path]
         For a file that is none, or a set of another contest.
     """
     short = f"benchmarks/{name}"
-    path, text, data = loading.read_kind(short if short in loading.shipped() else name, "benchmark")
-    model: BenchmarkModel = loading.validated(BenchmarkModel, data, path, text)
+    document = read_kind(short if short in shipped() else name, "benchmark")
+    model: BenchmarkModel = document.validated(BenchmarkModel)
     if model.contest != contest:
-        raise BenchmarkError(f"{path.name} is a set for `bench {model.contest}`, not for `bench {contest}`")
-    return path.stem, model, path.parent
+        raise BenchmarkError(f"{document.path.name} is a set for `bench {model.contest}`, not for `bench {contest}`")
+    return document.path.stem, model, document.folder

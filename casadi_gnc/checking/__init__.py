@@ -1,35 +1,24 @@
 """Tell from a mission, before it flies, what would go wrong.
 
-Each module is a family: `checks(mission, scheme)` yields `Check`s. A law adds its own by
-`Law.checks`, a craft by `Craft.checks`.
+A family of checks is a function (mission, scheme) that yields `Check`s. Shipped families are modules here; a law
+adds its own by `Law.checks`, a craft by `Craft.checks`, an installed package by the entry point
+`casadi_gnc.checks`, a mission by `Mission.checks` (in a file: `checks = ["./mine.py:pointing"]`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
-from casadi_gnc.checking import allocation, authority, funnels, gains, geometry, noise, numbers, sampling
+from casadi_gnc import guests
 from casadi_gnc.checks import Check
-from casadi_gnc.errors import ProblemError
-from casadi_gnc.missions.mission import Mission, Scheme
-from casadi_gnc.problem_files import synthesis_checks as synthesis
-from casadi_gnc.problem_files.loading import load, read
-from casadi_gnc.problem_files.toml_place import describe
+from casadi_gnc.errors import CheckError, GncError
+from casadi_gnc.missions.checks import REGISTRY
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
-#: Families in the order in which they are told.
-FAMILIES: tuple[Callable[[Mission, Scheme], Iterable[Check]], ...] = (
-    geometry.checks,
-    authority.checks,
-    funnels.checks,
-    gains.checks,
-    sampling.checks,
-    noise.checks,
-    allocation.checks,
-    numbers.checks,
-)
+__all__ = ["REGISTRY", "Check", "as_data", "check"]
 
 
 def check(mission: Mission, scheme: str | None = None) -> list[Check]:
@@ -37,43 +26,51 @@ def check(mission: Mission, scheme: str | None = None) -> list[Check]:
 
     Parameters
     ----------
-    mission : from `casadi_gnc.load`.
+    mission : from `casadi_gnc.load`, or made from objects.
     scheme : its name; all by default.
+
+    Raises
+    ------
+    CheckError
+        Where a family that is not ours fails; with its own lines.
 
     Examples
     --------
     >>> import casadi_gnc
-    >>> from casadi_gnc.checking import check
-    >>> found = check(casadi_gnc.load("huang2020/slew_as_printed"), "funnel_pinv")
+    >>> found = casadi_gnc.check(casadi_gnc.load("huang2020/slew_as_printed"), "funnel_pinv")
     >>> [each.name for each in found if each.verdict == "fail"]
     ['funnel.floor.mrp', 'gains.anti_windup', 'sampling.closed_loop']
     """
     chosen = mission.schemes if scheme is None else (mission.scheme(scheme),)
-    return [
-        each.of(one.name) for one in chosen for family in (*FAMILIES, mission.checks) for each in family(mission, one)
-    ]
+    families = [*map(REGISTRY.find, REGISTRY.names()), mission.craft.checks, *mission.checks]
+    return [each.of(one.name) for one in chosen for family in families for each in _found(family, mission, one)]
 
 
-def check_file(problem: str | Path, schemes: list[str] | None = None) -> tuple[str, list[Check]]:
-    """Return a title and all checks of a problem file, of a mission or of a synthesis.
-
-    Raises
-    ------
-    ProblemError
-        For a file that cannot be read or is of another kind.
-    """
-    path, text, data = read(problem)
-    if data.get("kind") == "synthesis":
-        return synthesis.check(problem)
-    if data.get("kind") != "mission":
-        message = f'kind is {data.get("kind")!r}; check takes a file of kind "mission" or "synthesis"'
-        raise ProblemError(message, describe(path, text, ("kind",)))
-    mission = load(problem, strict=False)
-    names = schemes or [scheme.name for scheme in mission.schemes]
-    return mission.title or mission.name, [each for name in names for each in check(mission, name)]
+def _found(family: Any, mission: Mission, scheme: Scheme) -> list[Check]:
+    """Return what a family finds; an error of one that is not ours is told with its own lines."""
+    try:
+        found = list(family(mission, scheme))
+    except GncError:
+        raise
+    except Exception as error:
+        if _is_ours(family):
+            raise
+        raise CheckError(f"the check {_name(family)} failed: {guests.told(error)}") from error
+    strange = [each for each in found if not isinstance(each, Check)]
+    if strange:
+        raise CheckError(f"the check {_name(family)} yielded a {type(strange[0]).__name__}, expected casadi_gnc.Check")
+    return found
 
 
-def as_data(checks: list[Check]) -> list[dict[str, Any]]:
+def _is_ours(family: Any) -> bool:
+    return str(getattr(family, "__module__", "")).startswith("casadi_gnc.")
+
+
+def _name(family: Any) -> str:
+    return str(getattr(family, "__qualname__", type(family).__name__))
+
+
+def as_data(checks: Iterable[Check]) -> list[dict[str, Any]]:
     """Return checks as plain data; numbers that are not finite become words."""
     return [
         {
@@ -81,7 +78,7 @@ def as_data(checks: list[Check]) -> list[dict[str, Any]]:
             "scheme": each.scheme,
             "value": _plain(each.value),
             "limit": _plain(each.limit),
-            "sense": "at least" if each.at_least else "at most",
+            "sense": ("more than" if each.strict else "at least") if each.at_least else "at most",
             "margin": _plain(each.margin),
             "unit": each.unit,
             "verdict": each.verdict,

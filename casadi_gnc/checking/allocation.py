@@ -1,7 +1,7 @@
 """Does the allocation turn a wanted effort into one that points the right way, whatever the truth?
 
 The map from wanted to made effort is T = B K: K the allocation's slope at rest, B the effectiveness
-as it may truly be (a craft lists its errors and faults, `Craft.truths`). An eigenvalue of T with a
+as it may truly be (a craft lists its errors and faults, `Craft.true_effectivenesses`). An eigenvalue of T with a
 negative real part turns a stabilising command into a destabilising one.
 """
 
@@ -13,8 +13,9 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.checks import Check
-from casadi_gnc.missions import tapes
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Commands at which the slope is taken, as a share of the limits.
 _SMALL = 1e-3
@@ -25,7 +26,7 @@ ROUNDING = 1e-6
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the worst eigenvalue over the true effectivenesses, and what a rate limit leaves of a turning effort."""
     yield from _rate(mission, scheme)
-    if not mission.truths(mission, scheme) or not pushes_both_ways(scheme):
+    if not mission.craft.true_effectivenesses(mission, scheme) or not pushes_both_ways(scheme):
         return
     found = least_real_parts(mission, scheme, allocation_slope(mission, scheme))
     worst = min(found, key=lambda name: found[name])
@@ -45,9 +46,10 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
 def _rate(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield whether rate-limited actuators follow an effort that stands still while the craft turns under it."""
     actuation, plant = scheme.actuation, mission.truth
-    if not np.isfinite(actuation.rate) or "rate" not in plant.state.names:
+    turns = plant.state.of_kind("rate")
+    if not np.isfinite(actuation.rate) or not turns:
         return
-    turning = float(np.linalg.norm(np.array(mission.start)[plant.state.place("rate")]))
+    turning = max(float(np.linalg.norm(np.array(mission.start)[plant.state.place(each.name)])) for each in turns)
     stroke = float((np.array(actuation.upper) - np.array(actuation.lower)).max())
     yield Check(
         "allocation.rate",
@@ -73,7 +75,7 @@ def least_real_parts(mission: Mission, scheme: Scheme, slope: np.ndarray) -> dic
     scale = np.diag(np.array(scheme.actuation.limit_above))
     return {
         name: float(np.linalg.eigvals(np.linalg.solve(scale, truth @ slope @ scale)).real.min())
-        for name, truth in mission.truths(mission, scheme).items()
+        for name, truth in mission.craft.true_effectivenesses(mission, scheme).items()
     }
 
 
@@ -82,10 +84,11 @@ def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
     actuation, count = scheme.actuation, mission.truth.inputs.size
     lower, upper, rest = np.array(actuation.lower), np.array(actuation.upper), np.zeros(count)
     if actuation.is_symbolic:
-        s = tapes.Symbols(mission, scheme)
-        told = tapes.allocated(mission, scheme, s.y, s.limited, s.actuators, s.lower, s.upper)
+        loop = Loop(mission, scheme)
+        s = loop.symbols()
+        told = loop.allocated(s.y, s.limited, s.actuators, s.lower, s.upper)
         expression = ca.Function("allocate", [s.y, s.limited, s.actuators, s.lower, s.upper], [told])
-        y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), ca.DM.zeros(mission.truth.noise.size)))
+        y = mission.first_measurement()
 
         def allocate(u: np.ndarray) -> np.ndarray:
             return np.array(ca.DM(expression(y, u, rest, lower, upper)).full()).ravel()  # type: ignore[arg-type]

@@ -12,14 +12,29 @@ from scipy.optimize import linprog
 from casadi_gnc.checking import standing
 from casadi_gnc.checking.allocation import allocation_slope, pushes_both_ways
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Part of the load that may be left over where all of it is borne.
 _BORNE = 1e-6
+#: Share below which an effort counts as not made: what is left is the linear program's rounding.
+_SPANNED = 1e-9
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the share of the virtual-control box that is made, and what standing still at the target takes."""
+    yield Check(
+        "authority.span",
+        spanned(mission, scheme),
+        0.0,
+        "-",
+        "fail",
+        "The actuators cannot make some effort at all, however little of it: the craft drifts off that way.",
+        "Add or turn an actuator so that every direction of effort can be made.",
+        "least share of what all actuators make of a row of effort at most, with the other rows at zero",
+        at_least=True,
+        strict=True,
+    )
     share = attainable_share(mission, scheme)
     yield Check(
         "authority.virtual_control",
@@ -59,9 +74,35 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
 
 def believed(mission: Mission, scheme: Scheme) -> np.ndarray:
     """Return the believed effectiveness at the first measurement, (R, N)."""
-    quiet = ca.DM.zeros(mission.truth.noise.size)
-    y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), quiet))
+    y = mission.first_measurement()
     return np.array(ca.DM(scheme.actuation.matrix(mission.truth.measurement.split(y))).full())
+
+
+def spanned(mission: Mission, scheme: Scheme) -> float:
+    """Return the least share of its reach that each row of effort can be made with, alone and on both sides.
+
+    Efforts along both sides of every axis have zero inside their hull, so all directions can be made a little, or,
+    where the share is 0, some cannot at all: actuators that push to one side of a plane.
+    """
+    matrix = believed(mission, scheme)
+    lower, upper = np.array(scheme.actuation.lower), np.array(scheme.actuation.upper)
+    reach = np.abs(matrix) @ np.maximum(np.abs(lower), np.abs(upper))
+    if not np.isfinite(matrix).all() or not (reach > 0).all():
+        return 0.0
+    scaled = matrix / reach[:, None]
+    rows, count = scaled.shape
+    corners = np.vstack([np.eye(rows), -np.eye(rows)])
+    shares = []
+    for corner in corners:
+        found = linprog(
+            np.r_[np.zeros(count), -1.0],
+            A_eq=np.column_stack([scaled, -corner]),
+            b_eq=np.zeros(rows),
+            bounds=[*zip(lower, upper, strict=True), (0, 1e6)],
+        )
+        shares.append(found.x[-1] if found.status == 0 else 0.0)
+    least = float(min(shares))
+    return least if least > _SPANNED else 0.0
 
 
 def attainable_share(mission: Mission, scheme: Scheme) -> float:

@@ -20,7 +20,8 @@ from scipy.optimize import linprog
 from casadi_gnc.checking.authority import believed
 from casadi_gnc.checking.linear import loop_at, target_state
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Funnel, Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Funnel, Scheme
 
 #: Intervals of the grid, over the time in which the funnel comes within 1 % of its floor.
 _GRID = 80
@@ -65,14 +66,12 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
 
 
 def _is_attitude(mission: Mission, funnel: Funnel) -> bool:
-    layout = mission.truth.measurement
-    place, unit = layout.place(funnel.signal), {s.name: s.unit for s in layout.signals}[funnel.signal]
-    return place.stop - place.start == 3 and unit == "-"
+    return mission.truth.measurement.signal(funnel.signal).kind == "mrp"
 
 
 def attitude_range(mission: Mission, funnel: Funnel) -> Iterator[Check]:
     """Yield whether MRPs start, and may go, less than half a turn away: in a funnel they cannot change sets."""
-    y = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), ca.DM.zeros(mission.truth.noise.size)))
+    y = mission.first_measurement()
     start = float(ca.norm_2(y[mission.truth.measurement.place(funnel.signal)]))
     yield Check(
         f"funnel.half_turn.{funnel.signal}",

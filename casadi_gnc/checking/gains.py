@@ -9,7 +9,8 @@ import numpy as np
 from casadi_gnc.checking.linear import loop_at, spectral_radius
 from casadi_gnc.checking.sampling import ROUNDING
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:

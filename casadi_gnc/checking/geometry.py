@@ -10,7 +10,9 @@ import numpy as np
 
 from casadi_gnc.checking.authority import believed
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.mathematics import exact
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Largest condition number of the effectiveness that is no nuisance.
 _WELL_CONDITIONED = 100.0
@@ -43,10 +45,9 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "Turn the actuators, or fit the limits of the effort to what the actuators make.",
         "condition number of the effectiveness, rows scaled by their limits",
     )
-    for whose, body in (("believed", scheme.law), ("true", mission.truth)):
-        inertia = _inertia(body)
-        if inertia is not None:
-            yield triangle(f"geometry.{whose}_inertia", inertia)
+    for whose, inertia in {"believed": scheme.law.believed_inertia(), **mission.truth.inertias()}.items():
+        if inertia is not None and exact.is_number(inertia):
+            yield triangle(f"geometry.{whose}_inertia", np.array(ca.DM(inertia)))
 
 
 def scale(scheme: Scheme) -> np.ndarray:
@@ -76,13 +77,3 @@ def rotation(name: str, matrix: Any, consequence: str, remedy: str) -> Check:
     turned = np.array(ca.DM(matrix))
     residual = float(max(np.abs(turned @ turned.T - np.eye(3)).max(), abs(np.linalg.det(turned) - 1)))
     return Check(name, residual, 1e-3, "-", "warn", consequence, remedy, "largest entry of R R' - I, and det R - 1")
-
-
-def _inertia(holder: Any) -> np.ndarray | None:
-    """Return the inertia that a law believes or a plant has, (3, 3), if it has one of numbers."""
-    for at in (holder, getattr(holder, "body", None), getattr(getattr(holder, "motion", None), "body", None)):
-        found = getattr(at, "inertia", None)
-        if found is not None and not isinstance(found, (ca.SX, ca.MX)):
-            return np.array(ca.DM(found))
-    body = getattr(getattr(holder, "body", None), "body", None)
-    return None if body is None else np.array(ca.DM(body.inertia))

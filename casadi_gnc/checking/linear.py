@@ -15,9 +15,9 @@ import casadi as ca
 import numpy as np
 from scipy import linalg
 
-from casadi_gnc.laws import advance
-from casadi_gnc.missions import tapes
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 
 def rows_of(mission: Mission) -> list[int]:
@@ -106,11 +106,10 @@ class LinearLoop:
     @cached_property
     def target(self) -> tuple[np.ndarray, np.ndarray]:
         """The plant's state at the target, and the memory that a law starts with there."""
-        mission, law = self.mission, self.scheme.law
-        quiet = ca.DM.zeros(mission.truth.noise.size)
+        mission = self.mission
         x0 = target_state(mission)
-        y0 = ca.DM(mission.truth.measure(self.t, ca.DM(x0), quiet))
-        m0 = ca.DM(law.start(ca.DM(self.t), tapes.law_inputs(mission, self.scheme, y0)))
+        y0 = ca.DM(mission.truth.measure(self.t, ca.DM(x0), mission.quiet()))
+        m0 = ca.DM(Loop(mission, self.scheme).started(ca.DM(self.t), y0))
         return x0, np.array(m0).ravel()
 
     @lru_cache(maxsize=1)  # noqa: B019 - loops are few and kept by `loop_at` anyway
@@ -140,24 +139,20 @@ class LinearLoop:
 @lru_cache(maxsize=_KEPT)
 def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Function]:
     """Return (t, x, m) -> regulated states and memory, moved, or their rates; and the Jacobians of that."""
-    law, s = scheme.law, tapes.Symbols(mission, scheme)
-    sampled = mission.timing.mode == "sampled"
-    quiet = ca.DM.zeros(mission.truth.noise.size)
-    y = mission.truth.measure(s.t, s.x, quiet)
-    seen = tapes.law_inputs(mission, scheme, y)
-    remembered = law.jump(s.t, seen, s.m)
-    wanted = law.command(s.t, seen, remembered)
+    loop = Loop(mission, scheme)
+    s, quiet, sampled = loop.symbols(), mission.quiet(), mission.timing.mode == "sampled"
+    y = loop.sensed(s.t, s.x, quiet)
+    seen = loop.seen(y)
+    remembered, wanted = loop.commanded(s.t, seen, s.m)
     actuators = unlimited(mission, scheme, y, wanted)
     told = ca.SX.sym("told", wanted.numel())
     if sampled:
-        x, h = s.x, mission.timing.sample_period / mission.timing.substeps
-        for i in range(mission.timing.substeps):
-            x = tapes.plant_step(mission, s.t + i * h, x, s.actuators, quiet)
-        later = advance(law, s.t, seen, remembered, wanted, told)
+        x = loop.held(s.t, s.x, s.actuators, quiet)
+        later = loop.advanced(s.t, seen, remembered, wanted, told)
     else:
-        x = mission.truth.rate(s.t, s.x, s.actuators, quiet)
-        later = law.rate(s.t, seen, remembered, wanted, told)
-    made = tapes.made(mission, scheme, y, actuators)
+        x = loop.moved(s.t, s.x, s.actuators, quiet)
+        later = loop.flowing(s.t, seen, remembered, wanted, told)
+    made = loop.made(y, actuators)
     rows, late = rows_of(mission), s.actuators
     state = ca.vertcat(s.x[rows], s.m)
     closed = ca.vertcat(ca.substitute(x, late, actuators)[rows], ca.substitute(later, told, made))
@@ -192,12 +187,11 @@ def _without_still(matrix: np.ndarray, sampled: bool) -> np.ndarray:
 
 def command_slope(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
     """Return d(command)/d(measurement) at the target at the end of the flight, and that measurement."""
-    plant, seen = mission.truth, mission.truth.measurement.symbol("y")
-    y = ca.DM(plant.measure(0.0, ca.DM(target_state(mission)), ca.DM.zeros(plant.noise.size)))
-    memory = ca.DM(scheme.law.start(ca.DM(0.0), tapes.law_inputs(mission, scheme, y)))
-    end = ca.DM(mission.timing.duration)
-    inputs = tapes.law_inputs(mission, scheme, seen)
-    command = ca.SX(scheme.law.command(end, inputs, scheme.law.jump(end, inputs, memory)))
+    loop, seen = Loop(mission, scheme), mission.truth.measurement.symbol("y")
+    y = ca.DM(mission.truth.measure(0.0, ca.DM(target_state(mission)), mission.quiet()))
+    memory = ca.DM(loop.started(ca.DM(0.0), y))
+    _, wanted = loop.commanded(ca.DM(mission.timing.duration), loop.seen(seen), memory)
+    command = ca.SX(wanted)
     slope = ca.Function("slope", [seen], [ca.jacobian(command, seen)])
     return np.array(ca.DM(slope(y)).full()), np.array(y).ravel()
 

@@ -18,7 +18,9 @@ import numpy as np
 
 from casadi_gnc.checking.linear import target_state
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Funnel, Mission, Scheme
+from casadi_gnc.missions.loop import funnel_signals
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Funnel, Scheme
 
 #: A signal is moved directly by what changes its rate by so much.
 _SPEED = 0.1
@@ -64,8 +66,8 @@ def flown_use(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     h = mission.timing.sample_period
     narrowing = float(np.log(1 / _LEFT) / np.array(ca.DM(funnel.bounds.decay)).min())
     duration = min(mission.timing.duration, h * np.ceil(narrowing / h))
-    shown = replace(mission, start=[float(each) for each in alone], metrics=()).with_timing(duration=float(duration))
+    begun = {name: list(alone[plant.state.place(name)]) for name in plant.state.names}
+    shown = replace(mission, start_from=begun, metrics=()).with_timing(duration=float(duration))
     flight = fly(shown, scheme.name)
-    several = len(mission.funnels) > 1
-    use = flight[f"funnel_use_{funnel.signal}" if several else "funnel_use"]
+    use = flight[funnel_signals(mission, funnel).names[-1]]
     return float("inf") if flight.diverged or not np.isfinite(use).all() else float(use.max())

@@ -10,7 +10,8 @@ import numpy as np
 from casadi_gnc.checking.allocation import allocation_slope, pushes_both_ways
 from casadi_gnc.checking.linear import command_slope, target_state
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Shares of an effort's limit, as standard deviation, from which noise is a nuisance and a failure.
 NUISANCE, DROWNING = 0.3, 1.0

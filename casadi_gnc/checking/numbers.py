@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import casadi as ca
 import numpy as np
 
 from casadi_gnc.checking.linear import command_slope
 from casadi_gnc.checking.noise import limits
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Share of an effort's limit that rounding may move the command.
 _SHARE = 0.01
@@ -44,9 +44,7 @@ def orbit(eccentricity: float, perigee: float, radius: float) -> Iterator[Check]
 def _tolerances(mission: Mission) -> Iterator[Check]:
     """Yield how coarse float32 is for measured signals that a metric compares with a threshold."""
     layout = mission.truth.measurement
-    start = np.array(
-        ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), ca.DM.zeros(mission.truth.noise.size)))
-    ).ravel()
+    start = np.array(mission.first_measurement()).ravel()
     asked = {m.signal: m.threshold for m in mission.metrics if m.threshold > 0 and m.signal in layout.names}
     for signal in dict.fromkeys(asked):
         finest = min(m.threshold for m in mission.metrics if m.signal == signal and m.threshold > 0)
@@ -69,8 +67,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     slope, y = command_slope(mission, scheme)
     if not np.isfinite(slope).all():
         return
-    start = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), ca.DM.zeros(mission.truth.noise.size)))
-    largest = np.maximum(np.abs(y), np.abs(np.array(start).ravel()))
+    largest = np.maximum(np.abs(y), np.abs(np.array(mission.first_measurement()).ravel()))
     ulp = np.spacing(largest.astype(np.float32)).astype(float)
     moved = np.abs(slope) @ (ulp / 2)
     yield Check(

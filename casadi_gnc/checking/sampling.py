@@ -13,7 +13,8 @@ from casadi_gnc.checking.linear import loop_at, spectral_radius
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
 from casadi_gnc.laws import Law
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: An eigenvalue on the unit circle (an integrator, an estimate that nothing excites) is no instability.
 ROUNDING = 1e-6

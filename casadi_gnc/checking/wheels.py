@@ -11,7 +11,8 @@ import numpy as np
 from casadi_gnc.checking import authority, standing
 from casadi_gnc.checking.allocation import ROUNDING, allocation_slope, least_real_parts
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 
 #: Accuracy weights that are tried.
 WEIGHTS = 10.0 ** np.arange(0, 6.5, 0.5)
@@ -39,7 +40,8 @@ def largest_speed(mission: Mission, scheme: Scheme) -> float:
     times, _, _ = standing.loads(mission)
     actuators = np.clip(standing.efforts(mission, slope) @ slope.T, scheme.actuation.lower, scheme.actuation.upper)
     x = standing.target_state(mission)
-    rows, quiet = plant.state.place("wheel_speed"), np.zeros(plant.noise.size)
+    (speed,) = plant.state.of_kind("wheel_speed")
+    rows, quiet = plant.state.place(speed.name), np.zeros(plant.noise.size)
     made = np.array(
         [np.array(plant.rate(t, x, f, quiet)).ravel()[rows] for t, f in zip(times, actuators, strict=True)], dtype=float
     )

@@ -19,8 +19,8 @@ def check(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
-    from casadi_gnc.checking import check_file
     from casadi_gnc.checks import worst
+    from casadi_gnc.problem_files.checking import check_file
 
     title, found = check_file(problem, scheme)
     if plot is not None:
@@ -58,7 +58,8 @@ def _print(title: str, found: list[Check], plot: Path | None) -> None:
             table.add_row(f"[bold]{escape(scheme)}[/]")
         for one in group:
             unit = "" if one.unit == "-" else f" {one.unit}"
-            limit = f"{'>=' if one.at_least else '<='} {one.limit:.4g}{unit}"
+            sense = (">" if one.strict else ">=") if one.at_least else ("<" if one.strict else "<=")
+            limit = f"{sense} {one.limit:.4g}{unit}"
             table.add_row(one.name, f"{one.value:.4g}", limit, f"[{colours[one.verdict]}]{one.verdict}[/]")
     # Nothing is cut, however narrow the terminal: a line that is too long runs on.
     console = Console(soft_wrap=True)

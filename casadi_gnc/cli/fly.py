@@ -10,7 +10,8 @@ import typer
 
 if TYPE_CHECKING:
     from casadi_gnc.missions.flight import Flight
-    from casadi_gnc.missions.mission import Metric, Mission
+    from casadi_gnc.missions.mission import Mission
+    from casadi_gnc.missions.scheme import Metric
     from casadi_gnc.problem_files.sweeping import Sweep
 
 

@@ -12,10 +12,12 @@ from casadi_gnc.cli import (
     allocate,
     attainable,
     bench,
+    catalogue,
     check,
     doctor,
     fly,
     generate,
+    new,
     problems,
     reproduce,
     schema,
@@ -42,6 +44,9 @@ app.command("verify")(verify.verify)
 app.add_typer(bench.app, name="bench")
 app.add_typer(problems.app, name="problems")
 app.command("reproduce")(reproduce.reproduce)
+app.command("new")(new.new)
+app.command("laws")(catalogue.laws)
+app.command("crafts")(catalogue.crafts)
 app.command("schema")(schema.schema)
 app.command("doctor")(doctor.doctor)
 
@@ -52,6 +57,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    _say_what_code_runs()
     try:
         app()
         sys.stdout.flush()
@@ -66,6 +72,17 @@ def main() -> None:
         _silence()
         what = f"the output {error.filename!r}" if error.filename else "the output"
         _end(f"casadi-gnc: cannot write {what}: {error.strerror or error}", 2)
+
+
+def _say_what_code_runs() -> None:
+    """Print on stderr which file of the user's own code is run, before it is."""
+    import logging
+
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("casadi-gnc: %(message)s"))
+    logger = logging.getLogger("casadi_gnc")
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
 
 
 def _end(sentence: str, code: int) -> None:

@@ -15,12 +15,12 @@ def list_problems(context: typer.Context) -> None:
     """List the problems shipped; `copy` gives one to change."""
     if context.invoked_subcommand is not None:
         return
-    from casadi_gnc.problem_files.loading import read, shipped
+    from casadi_gnc.problem_files.document import read, shipped
 
     names = shipped()
     width = max(map(len, names))
     for name in names:
-        _, _, data = read(name)
+        data = read(name).data
         typer.echo(f"{name:<{width}}  {data.get('kind', '')}: {data.get('title', '')}")
 
 
@@ -31,12 +31,13 @@ def copy(
 ) -> None:
     """Copy a shipped problem into a folder; an existing file is never overwritten."""
     from casadi_gnc.errors import ProblemError
-    from casadi_gnc.problem_files.loading import read, shipped
+    from casadi_gnc.problem_files.document import read, shipped
     from casadi_gnc.system.files import prepare_folder, write_beside
 
     if name.removesuffix(".toml") not in shipped():
         raise ProblemError(f"no shipped problem {name!r}; there is {', '.join(shipped())}")
-    source, text, _ = read(name)
+    found = read(name)
+    source, text = found.path, found.text
     target = prepare_folder(folder) / source.name
     if target.exists():
         raise ProblemError(f"{target} exists and was left alone; choose another folder, or move it away")

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Annotated
 
 import typer
 
 
-def schema() -> None:
-    """Print the JSON Schema of a problem file."""
-    from pydantic import TypeAdapter
-
-    from casadi_gnc import vehicles as crafts
+def schema(
+    problem: Annotated[
+        str | None, typer.Argument(help="A problem file: its schema alone, with the tables of your own craft and laws.")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of problem files of every kind, or of one file."""
     from casadi_gnc.benchmarks.sets import BenchmarkModel
     from casadi_gnc.fidelity.claims import ClaimsFile
-    from casadi_gnc.problem_files.allocation_file import AllocationModel
-    from casadi_gnc.problem_files.synthesis_file import SynthesisModel
+    from casadi_gnc.problem_files import json_schema
 
-    files: Any = AllocationModel | SynthesisModel | BenchmarkModel | ClaimsFile
-    for name in crafts.names():
-        files = files | crafts.module(name).MissionFile
-    described = TypeAdapter(files).json_schema()
-    content = {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
-    typer.echo(json.dumps(content, indent=2))
+    found = json_schema.every_kind(BenchmarkModel, ClaimsFile) if problem is None else json_schema.of_file(problem)
+    typer.echo(json.dumps(found, indent=2))

@@ -9,15 +9,17 @@ import typer
 
 def synthesize(
     problem: Annotated[str, typer.Argument(help="A synthesis file, or the name of a shipped one.")],
-    backend: Annotated[str | None, typer.Option(help="clarabel, scs or barrier, instead of the file's.")] = None,
+    backend: Annotated[
+        str | None, typer.Option(help="clarabel, scs, barrier or ./file.py:NAME, instead of the file's.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """Find gains by a recipe and certify them; exit code 1 where there are none that can be used."""
-    from casadi_gnc.errors import SynthesisError
     from casadi_gnc.problem_files.synthesis_file import load_synthesis, synthesize
+    from casadi_gnc.synthesis import backends
 
-    if backend not in (None, "clarabel", "scs", "barrier"):
-        raise SynthesisError(f"no synthesis back end {backend!r}; there is clarabel, scs, barrier")
+    if backend is not None:
+        backends.module(backend)
     case = load_synthesis(problem)
     found = synthesize(case, backend)
     if json:

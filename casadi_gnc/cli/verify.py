@@ -17,7 +17,7 @@ def verify(
     report: Annotated[Path | None, typer.Option(help="Write an HTML report.")] = None,
 ) -> None:
     """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs."""
-    from casadi_gnc.delivery.packaging import verify as run
+    from casadi_gnc.delivery.verifying import verify as run
     from casadi_gnc.embedded import targets
 
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]

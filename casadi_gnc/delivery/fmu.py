@@ -6,21 +6,20 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from casadi_gnc.delivery.describing import describe
-from casadi_gnc.delivery.vectors import sampled
+from casadi_gnc.delivery.packaging import REALS
 from casadi_gnc.embedded import fmu
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.errors import OutputError, PackageError
-from casadi_gnc.problem_files.loading import load, read
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.onboard import describe, sampled
+from casadi_gnc.problem_files.by_name import mission_of
 from casadi_gnc.system.files import prepare_folder, write_beside
 from casadi_gnc.system.folders import workshop
 
-_REALS = {"float64": "double", "float32": "float"}
-
 
 def generate_fmu(
-    problem: str | Path,
-    out: Path | None = None,
+    problem: str | Path | Mission,
+    out: str | Path | None = None,
     *,
     scheme: str | None = None,
     name: str | None = None,
@@ -31,7 +30,7 @@ def generate_fmu(
 
     Parameters
     ----------
-    problem : a mission file, or the name of a shipped one.
+    problem : a mission, a mission file, or the name of a shipped one.
     out : the file; flight/<name>.fmu by default. An existing unit is replaced, another file is not.
     scheme, name, real, tunable : as for `casadi_gnc.delivery.packaging.generate`; tunable gains become parameters.
 
@@ -40,12 +39,11 @@ def generate_fmu(
     GncError
         Where something given is not right; nothing is written then.
     """
-    path, _, _ = read(problem)
-    mission = sampled(load(problem))
-    if real not in _REALS:
+    mission = sampled(mission_of(problem))
+    if real not in REALS:
         raise PackageError(f"real is {real!r}, expected float64 or float32")
-    options = Options(path.stem if name is None else name, _REALS[real])  # type: ignore[arg-type]
-    target = Path("flight") / f"{options.name}.fmu" if out is None else out
+    options = Options(mission.name if name is None else name, REALS[real])  # type: ignore[arg-type]
+    target = Path("flight") / f"{options.name}.fmu" if out is None else Path(out)
     if target.suffix != ".fmu" or target.is_dir():
         raise OutputError(f"{target} does not end in .fmu; name the file to write with --out")
     controller = describe(mission, scheme, tunable)

@@ -15,7 +15,8 @@ from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.mathematics.noise import uniform_count, uniforms
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.mission import Mission, Scheme
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.system import assets, compilers
 
 #: What bad sensors say, in turn: the controller must raise a status and stay finite.
@@ -95,8 +96,3 @@ def _spoil(row: np.ndarray, number: int) -> np.ndarray:
     if number % 3 != 2:
         row[1 + (number * 5) % (len(row) - 1)] = BAD[number % len(BAD)]
     return row
-
-
-def sampled(mission: Mission) -> Mission:
-    """Return the mission as it flies on board: sampled."""
-    return mission if mission.timing.mode == "sampled" else mission.with_timing(mode="sampled")

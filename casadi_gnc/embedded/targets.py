@@ -6,6 +6,7 @@ exact and the same on every host.
 
 from __future__ import annotations
 
+import difflib
 import re
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ import numpy as np
 
 from casadi_gnc.embedded import stack
 from casadi_gnc.errors import TargetError
+from casadi_gnc.registry import Registry
 from casadi_gnc.system import assets
 from casadi_gnc.system.folders import workshop
 
@@ -38,7 +40,7 @@ _NUMBERS = 8
 
 @dataclass(frozen=True)
 class Target:
-    """Describe a board: what to compile with, what to run in; fields as in its file."""
+    """Describe a board: what to compile with, what to run in; fields as in its file, and the folder of that."""
 
     name: str
     title: str
@@ -50,6 +52,12 @@ class Target:
     emulator: tuple[str, ...]
     hardware: tuple[str, ...]
     packages: tuple[str, ...]
+    folder: Path = Path()
+
+    def place(self, name: str) -> Path:
+        """Return a source or script of the target: beside its own file, else among the shipped ones."""
+        beside = self.folder / name
+        return beside if beside.is_file() else assets.folder("codegen") / "targets" / name
 
     def missing(self) -> list[str]:
         """Return the commands that are not installed."""
@@ -116,19 +124,63 @@ class Measured:
         }
 
 
+def _shipped(name: str) -> Path:
+    return assets.folder("codegen") / "targets" / f"{name}.toml"
+
+
+#: Targets of installed packages by name: a `Target`, or the path of its file.
+REGISTRY = Registry(
+    "target",
+    "casadi_gnc.targets",
+    {},
+    is_one=lambda thing: isinstance(thing, (Target, Path)),
+    expected="a casadi_gnc.embedded.targets.Target, or the pathlib.Path of its file",
+    error=TargetError,
+)
+
+
 def names() -> list[str]:
-    """Return the names of the targets there are."""
-    return sorted(path.stem for path in (assets.folder("codegen") / "targets").glob("*.toml"))
+    """Return the names of the targets there are, shipped ones first."""
+    own = sorted(path.stem for path in (assets.folder("codegen") / "targets").glob("*.toml"))
+    return [*own, *REGISTRY.names()]
 
 
-def find(name: str) -> Target:
-    """Return a target by name; raise `TargetError` naming those there are."""
-    path = assets.folder("codegen") / "targets" / f"{name}.toml"
-    if name not in names():
-        raise TargetError(f"no target {name!r}; there is host, {', '.join(names())}")
-    fields = tomllib.loads(path.read_text(encoding="utf-8"))
+def find(name: Any) -> Target:
+    """Return a target by its name, by the path of its own file ("./board.toml"), or as it is.
+
+    Raises
+    ------
+    TargetError
+        For a name that is none, naming those there are, or a file that does not describe a target.
+    """
+    if isinstance(name, Target):
+        return name
+    if isinstance(name, Path) or str(name).endswith(".toml"):
+        return of_file(Path(name))
+    if _shipped(str(name)).is_file():
+        return of_file(_shipped(str(name)))
+    if name not in REGISTRY.names():
+        near = difflib.get_close_matches(str(name), names(), 1)
+        hint = f"did you mean {near[0]!r}? There" if near else "there"
+        known = ", ".join(names())
+        raise TargetError(f"no target {name!r}; {hint} is host, {known}, and the path of a file of your own")
+    return find(REGISTRY.find(name))
+
+
+def of_file(path: Path) -> Target:
+    """Return the target that a TOML file describes; its sources and linker script lie beside it or are shipped ones."""
+    try:
+        fields = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise TargetError(f"the target {path} cannot be read: {error}") from error
+    known = [field for field in Target.__dataclass_fields__ if field not in ("name", "folder")]
+    wrong = [key for key in fields if key not in known]
+    missing = [key for key in known if key not in fields]
+    if wrong or missing:
+        told = f"unknown key {wrong[0]!r}" if wrong else f"{missing[0]!r} is missing"
+        raise TargetError(f"the target {path.name}: {told}; expected {', '.join(known)}")
     whole: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
-    return Target(name, **whole)
+    return Target(path.stem, **whole, folder=path.parent)
 
 
 def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", float_only: bool = False) -> Measured:
@@ -156,10 +208,10 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
         if float_only:
             _refuse_doubles(objects, target)
         board = assets.folder("codegen") / "targets"
-        extra = [folder / "test" / "vectors.c", board / "measure.c", *(board / source for source in target.sources)]
+        extra = [folder / "test" / "vectors.c", board / "measure.c", *map(target.place, target.sources)]
         rest = [_compile(source, shop, folder, target, _BOARD_FLAGS) for source in extra]
         image = shop / "image.elf"
-        link = [target.compiler, *target.flags, *target.link, f"-T{board / target.script}", "-Wl,--gc-sections"]
+        link = [target.compiler, *target.flags, *target.link, f"-T{target.place(target.script)}", "-Wl,--gc-sections"]
         _run([*link, *map(str, objects + rest), "-lm", "-o", str(image)], target)
         words = _emulate(image, target, shop)
         text, data, bss = _size(objects, target)

@@ -22,7 +22,7 @@ from casadi_gnc.errors import GncError
 from casadi_gnc.fidelity.claims import ClaimModel, ClaimsFile
 from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.fidelity.verdict import Answer
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers
 from casadi_gnc.system.files import write_beside
@@ -88,7 +88,7 @@ def _questions(claims: list[ClaimModel]) -> dict[Question, list[tuple[str, str]]
 def _digest(problem: str) -> str:
     """Return the hash of a problem file's text; of one that cannot be read, nothing: its flight says why."""
     try:
-        return hashlib.sha256(read(problem)[1].encode()).hexdigest()
+        return hashlib.sha256(read(problem).text.encode()).hexdigest()
     except GncError:
         return ""
 
@@ -174,7 +174,7 @@ def find(question: Question) -> dict[str, Any]:
 def _fly(flight: dict[str, Any], metric: list[dict[str, Any]], status: dict[str, Any]) -> dict[str, float | None]:
     """Return the metrics and status numbers of a flight by the ids of the claims that ask them."""
     # The scheme alone: its flight may be asked for signals that the file's other schemes do not have.
-    tables = read(flight["problem"])[2].get("scheme", [])
+    tables = read(flight["problem"]).data.get("scheme", [])
     own = [table for table in tables if isinstance(table, dict) and table.get("name") == flight["scheme"]] or tables
     mission = casadi_gnc.load(flight["problem"], {"scheme": own, **flight["changes"], "metric": metric})
     alone = mission.with_scheme(flight["scheme"])

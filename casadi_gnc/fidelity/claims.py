@@ -13,10 +13,11 @@ from pydantic import Field, field_validator, model_validator
 
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.fidelity.computations import COMPUTATIONS
-from casadi_gnc.problem_files import loading
-from casadi_gnc.problem_files.schema import Format, MetricModel, Name, NonNegative, Part
+from casadi_gnc.problem_files.document import read_kind
+from casadi_gnc.problem_files.mission_tables import Format, MetricTable
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets
+from casadi_gnc.tables.part import Name, NonNegative, Part
 
 
 class FlightModel(Part):
@@ -79,7 +80,7 @@ class ClaimModel(Part):
         if (self.flight is not None) != ((self.metric is not None) + (self.status is not None) == 1):
             raise ValueError(f"claim {self.id!r}: a flight, and nothing else, takes either a metric or a status")
         if self.metric is not None:
-            MetricModel.model_validate({"name": self.id, **self.metric})
+            MetricTable.model_validate({"name": self.id, **self.metric})
         return self
 
 
@@ -118,5 +119,4 @@ def read_claims(paper: str) -> ClaimsFile:
     known = papers()
     if paper not in known and not Path(paper).is_file():
         raise ProblemError(f"no paper {paper!r}; there is {', '.join(known)}, or the path of a claims file")
-    path, text, data = loading.read_kind(known.get(paper, Path(paper)), "claims")
-    return loading.validated(ClaimsFile, data, path, text)
+    return read_kind(known.get(paper, Path(paper)), "claims").validated(ClaimsFile)

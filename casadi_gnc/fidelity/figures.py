@@ -7,7 +7,7 @@ from pathlib import Path
 import casadi_gnc
 from casadi_gnc.errors import GncError
 from casadi_gnc.fidelity.report import PaperReport
-from casadi_gnc.missions.mission import Mode
+from casadi_gnc.missions.timing import Mode
 from casadi_gnc.reports import flight_pictures as plots
 
 #: Samples kept of a flight for its picture.

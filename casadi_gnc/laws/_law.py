@@ -12,7 +12,7 @@ import dataclasses
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_type_hints
 
 import casadi as ca
 
@@ -56,6 +56,8 @@ def option(note: str, *choices: str, default: Any = dataclasses.MISSING) -> Any:
 class Law:
     """Base of all laws; `eq=False` because == on symbols is no bool.
 
+    A law that models the craft has a field `body`: it receives what the craft's software believes.
+
     Parameters
     ----------
     hold : sample period [s]; 0 means continuous.
@@ -67,8 +69,10 @@ class Law:
 
     #: Errata of the source that this law corrects: name -> one sentence.
     errata: ClassVar[dict[str, str]] = {}
-    #: Measured signals that the law reads, by the plant's names.
+    #: Measured signals that the law reads, by the plant's names; a signal without frame is taken in any.
     inputs: ClassVar[Layout] = Layout()
+    #: What `command` is made of, one signal a kind, in order; None: whatever the craft makes, in its order.
+    effort: ClassVar[Layout | None] = None
     #: Memory, what the law carries from one sample to the next.
     memory: ClassVar[Layout] = Layout()
     #: Funnels that the law keeps to: name of the field that takes it -> measured signal that it bounds.
@@ -99,6 +103,28 @@ class Law:
                     else "finite"
                 )
                 raise LawError(f"{name} is {value}, expected {expected}")
+
+    @classmethod
+    def reads(cls, belief: Any) -> Layout:
+        """Return the measured signals that the law reads on a craft of which the software believes `belief`."""
+        return cls.inputs
+
+    @classmethod
+    def belief_kind(cls) -> Any:
+        """Return the class that a craft's belief must have, that of the field `body`; None without such a field."""
+        if "body" not in {field.name for field in dataclasses.fields(cls)}:
+            return None
+        kind = get_type_hints(cls)["body"]
+        return object if kind is Any else kind
+
+    @property
+    def belief(self) -> Any:
+        """What the software believes of the craft: the field `body` of laws that have one, else None."""
+        return getattr(self, "body", None)
+
+    def believed_inertia(self) -> Any:
+        """Return the inertia that the law works with, (3, 3), [kg m^2], or None if it works with none."""
+        return getattr(self.belief, "inertia", None)
 
     def sign(self, erratum: str) -> int:
         """Return -1 where the source's sign is kept as printed, +1 where it is corrected."""

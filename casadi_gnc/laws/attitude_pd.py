@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from casadi_gnc.laws._law import Law, gain
+from casadi_gnc.laws.efforts import TORQUE
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 
@@ -20,6 +21,7 @@ class AttitudePD(Law):
     attitude_gain: Any = gain("N m", "torque per MRP", symbol="k_sigma", above=0.0)
     rate_gain: Any = gain("N m s/rad", "torque per rate", symbol="k_omega", above=0.0)
 
+    effort = TORQUE
     inputs = Layout((Signal("mrp", 3, "-"), Signal("rate", 3, "rad/s")))
 
     def command(self, t: Any, y: Any, m: Any) -> Any:

@@ -36,6 +36,7 @@ import numpy as np
 from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
+from casadi_gnc.laws.efforts import TORQUE
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
@@ -51,6 +52,7 @@ class Detumble(Law):
     compensator_decay: Any = gain("1/s", "decay of the missing torque", symbol="k4", above=0.0)
     observer_gain: Any = gain("1/s", "pole of the disturbance estimate", symbol="beta_omega", above=0.0)
 
+    effort = TORQUE
     inputs = Layout((Signal("rate", 3, "rad/s"),))
     memory = Layout((Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m s")))
     outputs = Layout((Signal("disturbance_estimate", 3, "rad/s^2"),))

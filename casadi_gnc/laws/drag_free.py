@@ -27,6 +27,7 @@ from casadi_gnc.laws.adaptive_backstepping import AdaptiveBackstepping, memory_l
 from casadi_gnc.laws.adaptive_bound import AdaptiveBound
 from casadi_gnc.laws.auxiliary_saturation import AuxiliarySaturation, NoAuxiliary
 from casadi_gnc.laws.drag_free_motions import AttitudeMotion, PositionMotion, Satellite, inertia_elements
+from casadi_gnc.laws.efforts import FORCE_AND_TORQUE
 from casadi_gnc.laws.performance_funnel import PerformanceFunnel
 from casadi_gnc.laws.projection import Projection, inertia_box
 from casadi_gnc.laws.sampled_funnel import SampledFunnel
@@ -78,6 +79,7 @@ class DragFree(Law):
     gain_softness: Any = gain("-", "softness of the auxiliary gain", symbol="b_2", above=0.0, default=0.1)
     first_gain: Any = gain("-", "auxiliary gain at the start", symbol="k(0)", above=0.0, default=0.001)
 
+    effort = FORCE_AND_TORQUE
     inputs = Layout(
         (
             Signal("mrp", 3, "-"),

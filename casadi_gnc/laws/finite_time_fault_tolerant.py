@@ -29,6 +29,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.laws._law import Law, gain
+from casadi_gnc.laws.efforts import TORQUE
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.reaction_wheels import attitude_signals, modelled_acceleration
@@ -53,10 +54,17 @@ class FiniteTimeFaultTolerant(Law):
     power: Any = gain("-", "exponent of that power", symbol="rho", above=0.0)
     floor: Any = gain("-", "MRP below which the slope is held", above=0.0, default=0.01)
 
+    effort = TORQUE
+
+    @classmethod
+    def reads(cls, belief: RigidBody) -> Layout:
+        """Return attitude and rate; the wheel speeds too where the body carries wheels."""
+        return attitude_signals(belief)
+
     @property
     def inputs(self) -> Layout:  # type: ignore[override]
-        """Attitude and rate; the wheel speeds too where the body carries wheels."""
-        return attitude_signals(self.body)
+        """What the law reads on its own body."""
+        return self.reads(self.body)
 
     def command(self, t: Any, y: Any, m: Any) -> Any:
         """Return u, (3,), [N m], on the body."""

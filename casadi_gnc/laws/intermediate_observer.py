@@ -42,6 +42,7 @@ import casadi as ca
 
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.approach import Approach, as_matrix
+from casadi_gnc.laws.efforts import FORCE
 from casadi_gnc.laws.sampled_loop import refuse_long_hold
 from casadi_gnc.laws.sampling import phi1
 from casadi_gnc.mechanics.relative_motion import PairModel
@@ -59,6 +60,7 @@ class IntermediateObserver(Law):
     disturbance_gain: Any = gain("kg^2/s", "correction of the disturbance", symbol="varpi", minimum=0.0)
     approach_speed: Any = gain("m/s", "largest speed towards the port; none: no limit", above=0.0, default=None)
 
+    effort = FORCE
     inputs = Layout((Signal("position", 3, "m"), Signal("velocity", 3, "m/s")))
     memory = Layout(
         (

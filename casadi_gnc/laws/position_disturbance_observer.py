@@ -34,6 +34,7 @@ from typing import Any
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.approach import Approach, as_matrix
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
+from casadi_gnc.laws.efforts import FORCE
 from casadi_gnc.laws.sampled_loop import refuse_long_hold
 from casadi_gnc.mechanics.relative_motion import PairModel
 from casadi_gnc.signals import Layout, Signal
@@ -49,6 +50,7 @@ class PositionDisturbanceObserver(Law):
     observer_gain: Any = gain("N s/m", "disturbance per velocity", symbol="L", above=0.0)
     approach_speed: Any = gain("m/s", "largest speed towards the port; none: no limit", above=0.0, default=None)
 
+    effort = FORCE
     inputs = Layout((Signal("position", 3, "m"), Signal("velocity", 3, "m/s")))
     memory = Layout((Signal("observer", 3, "m/s^2"),))
     outputs = Layout((Signal("disturbance_estimate", 3, "N"),))

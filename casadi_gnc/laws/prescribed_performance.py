@@ -49,6 +49,7 @@ from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.braking_limiter import BrakingLimiter
 from casadi_gnc.laws.command_filter import CommandFilter
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
+from casadi_gnc.laws.efforts import TORQUE
 from casadi_gnc.laws.performance_funnel import PerformanceFunnel
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
 from casadi_gnc.mechanics import attitude
@@ -76,6 +77,7 @@ class PrescribedPerformance(Law):
     braking_floor: Any = gain("-", "MRP at which the braking limit stops shrinking", above=0.0, default=1e-6)
 
     funnels = {"funnel": "mrp"}
+    effort = TORQUE
     inputs = Layout((Signal("mrp", 3, "-"), Signal("rate", 3, "rad/s")))
     memory = Layout(
         (Signal("rate_command", 3, "rad/s"), Signal("observer", 3, "rad/s^2"), Signal("missing", 3, "N m s"))

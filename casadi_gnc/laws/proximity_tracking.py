@@ -46,6 +46,7 @@ import casadi as ca
 from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
+from casadi_gnc.laws.efforts import FORCE_AND_TORQUE
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.proximity_motion import ProximityMotion
@@ -71,6 +72,7 @@ class ProximityTracking(Law):
         "-", "norm of the MRPs at which the law turns to the short way; none: never", minimum=1.0, default=None
     )
 
+    effort = FORCE_AND_TORQUE
     inputs = Layout(
         (
             Signal("position_error", 3, "m"),

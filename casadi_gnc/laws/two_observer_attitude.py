@@ -53,6 +53,7 @@ from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.laws._law import Law, gain
 from casadi_gnc.laws.command_filter import CommandFilter
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
+from casadi_gnc.laws.efforts import TORQUE
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.reaction_wheels import attitude_signals, modelled_acceleration
@@ -73,6 +74,7 @@ class TwoObserverAttitude(Law):
     observer_gain: Any = gain("1/s", "pole of the disturbance estimate", symbol="lambda", above=0.0)
     filter_time_constant: Any = gain("s", "lag of the rate command", symbol="tau2", above=0.0)
 
+    effort = TORQUE
     memory = Layout(
         (
             Signal("rate_command", 3, "rad/s"),
@@ -95,10 +97,15 @@ class TwoObserverAttitude(Law):
         "gravity_denominator": "R3 of (12) is divided by 1 + s's; only (1 + s's)^2 makes it a unit vector.",
     }
 
+    @classmethod
+    def reads(cls, belief: RigidBody) -> Layout:
+        """Return attitude and rate; the wheel speeds too where the body carries wheels."""
+        return attitude_signals(belief)
+
     @property
     def inputs(self) -> Layout:  # type: ignore[override]
-        """Attitude and rate; the wheel speeds too where the body carries wheels."""
-        return attitude_signals(self.body)
+        """What the law reads on its own body."""
+        return self.reads(self.body)
 
     @property
     def attitude_observer(self) -> DisturbanceObserver:

@@ -68,6 +68,11 @@ class ProximityMotion:
     gravitational_parameter: float
     target_orbit_radius: Any = None
 
+    @property
+    def inertia(self) -> Any:
+        """J, (3, 3), [kg m^2], of the chaser."""
+        return self.body.inertia
+
     def target_rate(self, now: SimpleNamespace) -> Any:
         """Return a = R omega_t, (3,), [rad/s], the target's rate in the chaser's frame."""
         return now.rate - now.rate_error

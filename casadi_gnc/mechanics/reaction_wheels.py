@@ -23,6 +23,7 @@ Source: Huang and Duan (2019), section II, doi:10.1109/ACCESS.2019.2949285.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -30,6 +31,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
@@ -73,16 +75,26 @@ def acceleration_bounds(speed: Any, max_speed: Any, period: float, lower: Any, u
 
 @dataclass(frozen=True, eq=False)
 class WheelArray:
-    """Hold N wheels of a body.
+    """Hold N wheels of a body; a wheel's command is its acceleration, and its torque on the body is -C J_w x.
 
     Parameters
     ----------
     axes : C, (3, N), body frame.
     inertia : J_w, [kg m^2].
+    max_acceleration : of each, [rad/s^2]; its motor's torque over J_w.
+    max_speed : of each, [rad/s]; the momentum it stores over J_w.
     """
 
     axes: Any
     inertia: Any
+    max_acceleration: float = math.inf
+    max_speed: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("inertia", "max_acceleration", "max_speed"):
+            value = getattr(self, name)
+            if not isinstance(value, (ca.SX, ca.MX)) and not ca.mmin(ca.DM(value)) > 0:
+                raise FlightError(f"{name} of the wheels is {value}, expected a positive number")
 
     @property
     def count(self) -> int:

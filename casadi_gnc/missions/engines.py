@@ -15,12 +15,25 @@ import numpy as np
 
 from casadi_gnc.allocation import Allocate, OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
+from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.noise import uniform_count, uniforms
-from casadi_gnc.missions.mission import Mission, Scheme
-from casadi_gnc.missions.tapes import Tapes
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.missions.tapes import Tapes, call
+from casadi_gnc.registry import Registry
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers
 from casadi_gnc.system.templates import template
+
+#: Engines by name: shipped ones, and those of installed packages; each is made of (mission, scheme, tapes).
+REGISTRY = Registry(
+    "engine",
+    "casadi_gnc.engines",
+    {"c": f"{__name__}:CompiledEngine", "vm": f"{__name__}:VirtualMachineEngine"},
+    is_one=lambda thing: isinstance(thing, type) and all(hasattr(thing, part) for part in ("name", "first", "run")),
+    expected="a class with name, first and run, as casadi_gnc.missions.engines.Engine",
+    error=FlightError,
+)
 
 
 @dataclass(eq=False)
@@ -62,6 +75,11 @@ _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] *
 def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc") -> str:
     """Return the C of a whole flight: every tape and the loop over them."""
     plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
+
+    def called(name: str, sample: str = "s->", **places: str) -> str:
+        """Return the call of a tape; `sample` owns what one evaluation of the controller leaves behind."""
+        return call(tapes.functions[name], _places(sample) | places)
+
     return template("flight.c.j2").render(
         title=f"{mission.name}, scheme {scheme.name}",
         mode=timing.mode,
@@ -85,12 +103,31 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         inexact=StepStatus.ALLOCATION_INEXACT.value,
         failed=StepStatus.ALLOCATION_FAILED.value,
         fused=fused,
+        call=called,
         tapes=[
             print_function(tape, maths=maths)
             for name, tape in tapes.functions.items()
             if not (fused and name in ("before", "allocate"))
         ],
     )
+
+
+def _places(sample: str) -> dict[str, str]:
+    """Return where the columns of a sample lie in the C of a flight."""
+    own = ("y", "accepted", "wanted", "limited", "lower", "upper", "flags", "report", "slope")
+    return {
+        **{name: f"{sample}{name}" for name in own},
+        "memory": f"{sample}m",
+        "told": f"{sample}actuators",
+        "t": "t",
+        "x": "x",
+        "m": "m",
+        "noise": "noise",
+        "row": "row",
+        "uniform": "uniform",
+        "good": "flight->good",
+        "actuators": "flight->actuators",
+    }
 
 
 class CompiledEngine:
@@ -168,45 +205,38 @@ class CompiledEngine:
 
 
 class _Tape:
-    """Call a CasADi function on numpy columns without the cost of its general call."""
+    """Call a CasADi function on numpy columns by their names, without the cost of its general call."""
 
     def __init__(self, function: ca.Function) -> None:
         buffer: Any
         buffer, self._trigger = function.buffer()
         self._buffer = buffer  # the trigger points into it
-        self._in = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
-        self._out = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        for i, column in enumerate(self._in):
+        self._in = {name: np.zeros(function.numel_in(i)) for i, name in enumerate(function.name_in())}
+        self._out = {name: np.zeros(function.numel_out(i)) for i, name in enumerate(function.name_out())}
+        for i, column in enumerate(self._in.values()):
             if column.size:
                 buffer.set_arg(i, memoryview(column.data))
-        for i, column in enumerate(self._out):
+        for i, column in enumerate(self._out.values()):
             if column.size:
                 buffer.set_res(i, memoryview(column.data))
 
-    def __call__(self, *columns: Any) -> Any:
-        for own, column in zip(self._in, columns, strict=True):
-            own[:] = column
+    def __call__(self, **columns: Any) -> dict[str, np.ndarray]:
+        for name, own in self._in.items():
+            own[:] = columns[name]
         self._trigger()
-        return self._out[0].copy() if len(self._out) == 1 else [column.copy() for column in self._out]
+        return {name: column.copy() for name, column in self._out.items()}
 
-
-@dataclass(eq=False)
-class _Sample:
-    """What one evaluation of the controller leaves behind; `y` is the accepted measurement, `slope` the rates."""
-
-    y: np.ndarray
-    m: np.ndarray
-    wanted: np.ndarray
-    limited: np.ndarray
-    flags: np.ndarray
-    actuators: np.ndarray
-    allocation_flags: float
-    report: np.ndarray
-    slope: np.ndarray | None = None
+    def one(self, **columns: Any) -> np.ndarray:
+        """Return the only result."""
+        (result,) = self(**columns).values()
+        return result
 
 
 class VirtualMachineEngine:
-    """Fly on CasADi's virtual machine: no compiler needed, some hundred times slower."""
+    """Fly on CasADi's virtual machine: no compiler needed, some hundred times slower.
+
+    A sample is a dictionary of columns by the names that the tapes' ports have.
+    """
 
     name = "vm"
 
@@ -220,67 +250,65 @@ class VirtualMachineEngine:
 
     def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first measurement, and the law's memory at it."""
-        measured = self._tape["sense"](0.0, x, self._draw(0))
-        return measured, self._tape["start"](measured)
+        measured = self._tape["sense"].one(t=0.0, x=x, noise=self._draw(0))
+        return measured, self._tape["start"].one(y=measured)
 
     def _draw(self, sample: int) -> np.ndarray:
         """Return the normal numbers of a sample, held over `every` sample periods."""
         draw = sample // self._noise.every
         if self._normals and draw != self._drawn[0]:
             uniform = uniforms(self._noise.seed, draw, uniform_count(self._normals))
-            self._drawn = (draw, self._tape["draw"](uniform))
+            self._drawn = (draw, self._tape["draw"].one(uniform=uniform))
         return self._drawn[1]
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
         """Fly sample by sample, as the loop of `flight.c.j2` does."""
         tape, kept = self._tape, 0
         for k in range(first, first + samples):
-            t, noise = k * self._timing.sample_period, self._draw(k)
-            s = self._control(carried, t, carried.x, carried.m, noise)
-            flags = s.flags + s.allocation_flags
-            carried.good[:] = s.y
-            row = tape["observe"](t, carried.x, s.y, s.m, s.wanted, s.limited, s.actuators, flags, s.report)
-            carried.tally[:] = tape["tally"](row, carried.tally)
+            s: dict[str, Any] = {"t": k * self._timing.sample_period, "x": carried.x, "m": carried.m}
+            s = self._control(carried, {**s, "noise": self._draw(k)})
+            s["flags"] = s["flags"] + s["allocation_flags"]
+            carried.good[:] = s["accepted"]
+            row = tape["observe"].one(**s)
+            carried.tally[:] = tape["tally"].one(row=row, tally=carried.tally)
             if k % decimation == 0:
                 record[kept] = row
                 kept += 1
-            self._advance(carried, t, noise, s)
-            carried.x[:] = tape["settle"](carried.x)
-            carried.actuators[:] = s.actuators
+            self._advance(carried, s)
+            carried.x[:] = tape["settle"].one(x=carried.x)
+            carried.actuators[:] = s["told"]
         return samples
 
-    def _control(self, carried: Carried, t: float, x: np.ndarray, m: np.ndarray, noise: np.ndarray) -> _Sample:
-        tape, last = self._tape, carried.actuators
+    def _control(self, carried: Carried, s: dict[str, Any]) -> dict[str, Any]:
+        """Return the columns of a sample completed by what the controller computes."""
+        tape = self._tape
+        s = {**s, "good": carried.good, "actuators": carried.actuators, "report": self._report, "allocation_flags": 0.0}
         if "stage" in tape:
-            slope, accepted, m, wanted, limited, flags, told = tape["stage"](t, x, carried.good, m, last, noise)
-            return _Sample(accepted, m, wanted, limited, flags, told, 0.0, self._report, slope)
-        y = tape["sense"](t, x, noise)
-        accepted, m, wanted, limited, lower, upper, flags = tape["before"](t, y, carried.good, m, last)
+            return {**s, **tape["stage"](**s)}
+        s["y"] = tape["sense"].one(**s)
+        s |= tape["before"](**s)
         if self._solve is None:
-            told = tape["allocate"](accepted, limited, last, lower, upper)
-            return _Sample(accepted, m, wanted, limited, flags, told, 0.0, self._report)
-        told, noted, report = self._solve(limited, last.copy(), lower, upper)
-        return _Sample(accepted, m, wanted, limited, flags, told, float(noted), report)
+            return {**s, **tape["allocate"](**s)}
+        told, noted, report = self._solve(s["limited"], carried.actuators.copy(), s["lower"], s["upper"])
+        return {**s, "told": told, "report": report, "allocation_flags": float(noted)}
 
-    def _slope(self, t: float, x: np.ndarray, noise: np.ndarray, s: _Sample) -> np.ndarray:
+    def _slope(self, s: dict[str, Any]) -> np.ndarray:
         """Return the rates of plant and memory at a point of the integrator."""
-        if s.slope is not None:
-            return s.slope
-        return self._tape["flow"](t, x, s.y, s.m, s.wanted, s.limited, s.actuators, noise)
+        return s["slope"] if "slope" in s else self._tape["flow"].one(**s)
 
-    def _advance(self, carried: Carried, t: float, noise: np.ndarray, s: _Sample) -> None:
-        tape, h, n = self._tape, self._timing.sample_period, self._states
+    def _advance(self, carried: Carried, s: dict[str, Any]) -> None:
+        tape, h, n, t = self._tape, self._timing.sample_period, self._states, s["t"]
         if self._timing.mode == "sampled":
-            carried.m[:] = tape["after"](t, s.y, s.m, s.wanted, s.limited, s.actuators)
+            carried.m[:] = tape["after"].one(**s)
             step = h / self._timing.substeps
             for i in range(self._timing.substeps):
-                carried.x[:] = tape["plant"](t + i * step, carried.x, s.actuators, noise)
+                carried.x[:] = tape["plant"].one(**{**s, "t": t + i * step, "x": carried.x})
             return
-        state = np.concatenate([carried.x, s.m])
-        slopes = [self._slope(t, carried.x, noise, s)]
+        state = np.concatenate([carried.x, s["memory"]])
+        slopes = [self._slope(s)]
         for length in (h / 2, h / 2, h):
-            moved = tape["point"](state, slopes[-1], length)
-            x, at = moved[:n], t + length
-            slopes.append(self._slope(at, x, noise, self._control(carried, at, x, moved[n:], noise)))
-        joined = tape["join"](state, *slopes)
+            moved = tape["point"].one(state=state, slope=slopes[-1], length=length)
+            at = {"t": t + length, "x": moved[:n], "m": moved[n:], "noise": s["noise"]}
+            slopes.append(self._slope(self._control(carried, at)))
+        joined = tape["join"].one(state=state, **{f"k{i}": slope for i, slope in enumerate(slopes, 1)})
         carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import csv
 import json
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from casadi_gnc.errors import FlightError
+from casadi_gnc.errors import FlightError, OutputError
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
-from casadi_gnc.system.files import write_beside
+from casadi_gnc.system.files import prepare_folder, write_beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +52,36 @@ class Flight:
         block = self.block(name)
         return block[:, 0] if block.shape[1] == 1 else block
 
+    def __contains__(self, name: object) -> bool:
+        return name in self.layout.names
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.layout.names)
+
+    def __len__(self) -> int:
+        return len(self.layout.names)
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of all signals, in order."""
+        return self.layout.names
+
+    def _ipython_key_completions_(self) -> list[str]:
+        """Return what a notebook offers inside flight["..."]."""
+        return list(self.layout.names)
+
     def __repr__(self) -> str:
         kept, columns = self.samples.shape
-        return f"Flight({self.mission}, {self.scheme}: {kept} samples of {columns} numbers, {self.metrics})"
+        told = ", ".join(f"{name} {_told(value, self.metric_units[name])}" for name, value in self.metrics.items())
+        return f"Flight({self.mission}, {self.scheme}: {kept} samples of {columns} numbers; {told or 'no metric'})"
+
+    def _repr_html_(self) -> str:
+        rows = [(name, _told(value, self.metric_units[name])) for name, value in self.metrics.items()]
+        for bit, (count, first) in self.statuses.items():
+            rows.append((str(bit.name), f"{count} samples, first at {first:g} s"))
+        cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(told)}</td></tr>" for name, told in rows)
+        notes = "".join(f"<li>{escape(note)}</li>" for note in self.notes)
+        listed = f"<ul>{notes}</ul>" if notes else ""
+        return f"<b>{escape(self.title or self.scheme)}</b><table>{cells}</table>{listed}"
 
     @property
     def diverged(self) -> bool:
@@ -99,6 +129,44 @@ class Flight:
             "seconds": self.seconds,
         }
 
+    def columns(self) -> tuple[list[str], np.ndarray]:
+        """Return a name for each column, "rate_1" or "time", and the samples, (K, columns)."""
+        names = [
+            signal.name if signal.size == 1 else f"{signal.name}_{i}"
+            for signal in self.layout.signals
+            for i in range(1, signal.size + 1)
+        ]
+        return names, self.samples
+
+    def to_csv(self, target: str | Path) -> Path:
+        """Write all samples as a table: names in the first line, units in the second, every bit of every number."""
+        names, samples = self.columns()
+        units = [signal.unit or "-" for signal in self.layout.signals for _ in range(signal.size)]
+
+        def write(path: Path) -> None:
+            with path.open("w", newline="", encoding="utf-8") as file:
+                rows = csv.writer(file)
+                rows.writerows([names, units])
+                rows.writerows([repr(float(number)) for number in row] for row in samples)
+
+        return _written(target, ".csv", write)
+
+    def to_mat(self, target: str | Path) -> Path:
+        """Write the signals as a MATLAB file of version 5, with their units in the struct `units`."""
+        from scipy.io import savemat
+
+        content = {**self.signals, "units": {name: self.unit(name) or "-" for name in self.layout.names}}
+        return _written(target, ".mat", lambda path: savemat(path, content, appendmat=False))
+
+    def to_pandas(self) -> Any:
+        """Return the samples as a pandas DataFrame with the time as index; raise `FlightError` without pandas."""
+        try:
+            import pandas  # type: ignore[import-not-found, import-untyped]
+        except ImportError:
+            raise FlightError("pandas is not installed; pip install pandas, or take to_csv or flight[signal]") from None
+        names, samples = self.columns()
+        return pandas.DataFrame(samples, columns=names).set_index("time")
+
     def save(self, folder: Path) -> Path:
         """Write the signals as `<scheme>.npz` (with units under `unit_<name>`); return its path."""
         arrays: dict[str, Any] = dict(self.signals)
@@ -106,6 +174,20 @@ class Flight:
         target = folder / f"{self.scheme}.npz"
         write_beside(target, lambda path: np.savez_compressed(path, **arrays))
         return target
+
+
+def _told(value: float | None, unit: str) -> str:
+    return "never" if value is None else f"{value:.5g} {unit if unit != '-' else ''}".rstrip()
+
+
+def _written(target: str | Path, ending: str, write: Callable[[Path], Any]) -> Path:
+    """Write a whole file or none; return its path."""
+    path = Path(target)
+    if path.suffix != ending:
+        raise OutputError(f"{path} does not end in {ending}")
+    prepare_folder(path.parent)
+    write_beside(path, write)
+    return path
 
 
 def save_summary(folder: Path, flights: list[Flight]) -> Path:

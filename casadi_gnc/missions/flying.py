@@ -5,19 +5,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from importlib import metadata
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from casadi_gnc.embedded.printer import Math
 from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.missions import metrics, tapes
-from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine, VirtualMachineEngine
+from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engine, VirtualMachineEngine
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.mission import Mission, Mode, Scheme
+from casadi_gnc.missions.loop import funnel_signals
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.missions.timing import Mode
 from casadi_gnc.status import StepStatus
 
-EngineName = Literal["c", "vm"]
+EngineName = Any
 Progress = Callable[[int, int], None]
 
 #: Samples between two calls of the progress function, at most.
@@ -42,8 +45,8 @@ def fly(
     ----------
     mission : from `casadi_gnc.load`.
     scheme : its name; the first one of the mission by default.
-    engine : "c" (compiled) or "vm" (CasADi's virtual machine). Without a compiler "c" becomes "vm"
-        and the flight's notes say so.
+    engine : "c" (compiled), "vm" (CasADi's virtual machine), another engine's name or class. Without a compiler "c"
+        becomes "vm" and the flight's notes say so.
     maths : elementary functions of the C: "gnc" (the same words on every machine) or "libm".
     mode : "sampled" or "continuous" instead of the mission's own.
     decimation : keep every so many-th sample, by default as the mission says; metrics and statuses use all of them.
@@ -57,8 +60,10 @@ def fly(
     decimation = mission.timing.record_every if decimation is None else decimation
     if decimation < 1:
         raise FlightError(f"decimation is {decimation}, expected 1 or more")
-    if engine not in ("c", "vm") or maths not in ("gnc", "libm") or mode not in (None, "sampled", "continuous"):
-        raise FlightError(f"engine {engine!r}, maths {maths!r}, mode {mode!r}: one of them is not known")
+    if maths not in ("gnc", "libm"):
+        raise FlightError(f"maths is {maths!r}, expected 'gnc' or 'libm'")
+    if mode not in (None, "sampled", "continuous"):
+        raise FlightError(f"mode is {mode!r}, expected 'sampled' or 'continuous'")
     if mode is not None and mode != mission.timing.mode:
         mission = mission.with_timing(mode=mode)
     chosen = mission.scheme(scheme)
@@ -101,7 +106,7 @@ def fly(
         made=made,
         seconds=seconds,
         notes=(
-            *mission.notes,
+            *mission.craft.notes(),
             *cautions(chosen),
             *notes,
             *_undefined(mission, values, raised),
@@ -140,8 +145,9 @@ def begin(mission: Mission, built: tapes.Tapes, runner: Engine) -> Carried:
 def _engine(
     mission: Mission, scheme: Scheme, built: tapes.Tapes, engine: EngineName, maths: Math
 ) -> tuple[Engine, tuple[str, ...]]:
-    if engine == "vm":
-        return VirtualMachineEngine(mission, scheme, built), ()
+    kind = REGISTRY.find(engine)
+    if kind is not CompiledEngine:
+        return kind(mission, scheme, built), ()
     try:
         return CompiledEngine(mission, scheme, built, maths), ()
     except NoCompilerError as error:
@@ -172,7 +178,7 @@ def _left(mission: Mission, built: tapes.Tapes, record: np.ndarray) -> tuple[str
     for funnel in mission.funnels:
         if funnel.signal not in built.row:
             continue
-        lower, upper = (record[:, built.row.place(name)] for name in tapes.funnel_signals(mission, funnel).names[:2])
+        lower, upper = (record[:, built.row.place(name)] for name in funnel_signals(mission, funnel).names[:2])
         signal = record[:, built.row.place(funnel.signal)]
         outside = ~((signal > lower) & (signal < upper))
         if outside.any():

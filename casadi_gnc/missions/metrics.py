@@ -33,7 +33,7 @@ from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 
 if TYPE_CHECKING:
-    from casadi_gnc.missions.mission import Metric
+    from casadi_gnc.missions.scheme import Metric
 
 #: "Not yet": no flight has a time below zero.
 NEVER = -1.0

@@ -1,220 +1,147 @@
-"""A mission: a plant, what the flight software believes of it, how it is timed, and one or more
-schemes that could fly it.
-"""
+"""A mission: a craft, how it is timed, and one or more schemes that could fly it."""
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
+import pickle
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import casadi as ca
 
+from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
-from casadi_gnc.laws import Law, PerformanceFunnel
+from casadi_gnc.guests import GuestFile
+from casadi_gnc.missions import fitting, functions
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.describing import on_one_screen
 from casadi_gnc.missions.plant import Plant
-from casadi_gnc.signals import Layout, Signal
-from casadi_gnc.status import StepStatus
+from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
+from casadi_gnc.missions.stepper import Stepper
+from casadi_gnc.missions.timing import Noise, Timing
+from casadi_gnc.tables.part import plain
 
-Mode = Literal["sampled", "continuous"]
-Feedback = Literal["achieved", "wanted"]
-MetricKind = Literal["settling", "reaching", "peak", "least", "final", "mean", "sample_sum"]
-
-
-@dataclass(frozen=True)
-class Timing:
-    """Say when things happen.
-
-    Parameters
-    ----------
-    mode : "sampled" (measure, hold, advance) or "continuous" (the law in every integrator stage).
-    sample_period : [s].
-    duration : [s].
-    substeps : Runge-Kutta steps of the plant in one sample period.
-    record_every : one sample of so many is kept.
-    """
-
-    mode: Mode
-    sample_period: float
-    duration: float
-    substeps: int = 1
-    record_every: int = 1
-
-    def __post_init__(self) -> None:
-        if self.mode not in ("sampled", "continuous"):
-            raise FlightError(f"mode is {self.mode!r}, expected 'sampled' or 'continuous'")
-        for name in ("sample_period", "duration", "substeps", "record_every"):
-            value = getattr(self, name)
-            if not (value > 0 and value < float("inf")):
-                raise FlightError(f"{name} is {value}, expected a positive number")
-
-    @property
-    def samples(self) -> int:
-        """Number of samples of a flight, both ends included."""
-        return round(self.duration / self.sample_period) + 1
+#: Changes of `with_scheme` that are of the scheme; all others are gains of its law.
+_OF_A_SCHEME = ("law", "feedback", "actuation", "title")
 
 
 @dataclass(frozen=True)
-class Noise:
-    """Say how the random numbers of a flight are drawn.
+class Origin:
+    """Say from which file a mission was read.
 
     Parameters
     ----------
-    seed : 0 to 2^64 - 1; the same seed gives the same flight on every machine.
-    every : sample periods from draw to draw; the numbers are held in between.
-    truncation : standard deviations beyond which a number is cut off.
+    name : of the file.
+    text : its content.
+    changes : values that were put in the place of the file's, by path.
+    guests : files of the user's own code that it names.
+    folder : where it lay, for relative names.
     """
-
-    seed: int = 1
-    every: int = 1
-    truncation: float = float("inf")
-
-
-#: The effort of a craft that only turns.
-TORQUE = Layout((Signal("torque", 3, "N m"),))
-
-
-@dataclass(frozen=True, eq=False)
-class Actuation:
-    """Say how a wanted effort becomes actuator commands.
-
-    Parameters
-    ----------
-    effectiveness : believed A, (R, N), or a function of the measured signals (by name) that returns it.
-    lower, upper : (N,), amplitude bounds, unit of the actuators.
-    rate : largest change of an actuator per second, `inf` for none.
-    limit_below, limit_above : (R,), box of the virtual control, units of `effort`.
-    allocator : an object with `report` and either `expression` (CasADi) or `start` (numpy).
-    effort : what the actuators make together, one signal a kind; R rows.
-    reach : function of the measured signals and the sample period that returns further bounds, lower and
-        upper, (N,) each.
-    judge : function (measured signals, limited effort, actuators) -> flags by status bit, on board.
-    inverse : function (measured signals, limited effort) -> actuators, (N,), that a craft knows better
-        than an allocator could: the allocator is then given this in the place of the effort.
-    """
-
-    effectiveness: ca.DM | Callable[[Any], Any]
-    lower: list[float]
-    upper: list[float]
-    rate: float
-    limit_below: list[float]
-    limit_above: list[float]
-    allocator: Any
-    effort: Layout = TORQUE
-    reach: Callable[[Any, float], tuple[Any, Any]] | None = None
-    judge: Callable[[Any, Any, Any], dict[StepStatus, Any]] | None = None
-    inverse: Callable[[Any, Any], Any] | None = None
-
-    def matrix(self, seen: Any) -> Any:
-        """Return the believed effectiveness, (R, N), at the measured signals `seen`."""
-        return self.effectiveness(seen) if callable(self.effectiveness) else self.effectiveness
-
-    def named(self, stage: str) -> Layout:
-        """Return the signals of an effort at a stage: "wanted", "limited" or "achieved".
-
-        A craft with one kind of effort has them by the stage's name; one with several, by stage and kind.
-        """
-        alone = len(self.effort.signals) == 1
-        return Layout(
-            tuple(replace(each, name=stage if alone else f"{stage}_{each.name}") for each in self.effort.signals)
-        )
-
-    @property
-    def is_symbolic(self) -> bool:
-        """Whether the allocation is a CasADi expression, so that the whole loop is one."""
-        return hasattr(self.allocator, "expression")
-
-
-@dataclass(frozen=True, eq=False)
-class Scheme:
-    """One way to fly a mission: law, actuation and what the law is told was achieved."""
 
     name: str
-    law: Law
-    actuation: Actuation
-    feedback: Feedback = "achieved"
-    title: str = ""
+    text: str
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    guests: tuple[GuestFile, ...] = ()
+    folder: Path = Path()
 
-    def __post_init__(self) -> None:
-        if self.feedback not in ("achieved", "wanted"):
-            raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
-
-
-@dataclass(frozen=True, eq=False)
-class Funnel:
-    """Bounds that a mission sets a measured signal, whichever law flies it."""
-
-    signal: str
-    bounds: PerformanceFunnel
+    @property
+    def digest(self) -> str:
+        """Hash of the text, what was changed, and the user's own code."""
+        lines = [f"\n# {key} = {value!r}" for key, value in sorted(self.changes.items())]
+        lines += [f"\n# {file.path} {file.sha256}" for file in self.guests]
+        return hashlib.sha256((self.text + "".join(lines)).encode()).hexdigest()
 
 
-@dataclass(frozen=True)
-class Metric:
-    """One number asked of a flight; kinds are defined in `casadi_gnc.missions.metrics`."""
-
-    name: str
-    kind: MetricKind
-    signal: str
-    threshold: float = 0.0
-    after: float = 0.0
-    unit: str = ""
-    until: float = float("inf")
-    norm: Literal["max", "two"] = "max"
-
-
-@dataclass(frozen=True)
-class Panel:
-    """Say what one panel of a flight's picture shows.
-
-    Parameters
-    ----------
-    kind : "tracked" (a measured signal, in its funnel if it has one), "effort" (limited and achieved,
-        with limits), "actuators" (lines, or rows of a map where there are many), "lines".
-    signal : its name; of an effort, the name in the craft's `effort`.
-    label : what stands at the axis, without unit.
-    scale, unit : factor applied, and the unit that it gives.
-    logarithmic : of "lines": the magnitude on a logarithmic axis.
-    level, level_label : of "lines": a value to draw a line at, in the signal's unit, and what it is.
-    """
-
-    kind: Literal["tracked", "effort", "actuators", "lines"]
-    signal: str
-    label: str
-    scale: float = 1.0
-    unit: str = ""
-    logarithmic: bool = False
-    level: float | None = None
-    level_label: str = ""
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mission:
-    """Everything needed to fly; made by `casadi_gnc.load`, changed by `with_timing`, `with_scheme`.
+    """Everything needed to fly: read by `casadi_gnc.load`, or made from objects.
 
-    `casadi.Function`s for analysis come from `plant`, `law`, `step` and `closed_loop`. `notes` are
-    what a reader of every flight must know, e.g. that an orbit is no orbit. `target` gives the states that
-    the laws regulate, by name, and the values that they bring them to; `checks` are the craft's own, and `truths` names
-    the effectivenesses, (R, N), that errors and faults may make true.
+    `casadi.Function`s for analysis come from `plant`, `law`, `step` and `closed_loop`; `controller` steps one
+    scheme by hand. It pickles, with the user's own code that it needs.
+
+    Parameters
+    ----------
+    craft : what flies.
+    schemes : at least one; laws are given the sample period of `timing`.
+    timing : when things happen.
+    name : of files that are written.
+    metrics : numbers asked of every flight.
+    funnels : bounds that the mission sets measured signals.
+    noise : how random numbers are drawn.
+    title, source : for whoever reads the results.
+    start_from : states that begin otherwise than the craft says, by signal.
+    checks : functions (mission, scheme) that yield further checks of this mission.
+    origin : the file that it was read from, if it was.
+
+    Raises
+    ------
+    FlightError
+        For schemes of one name, a start that the plant does not have, a metric or a funnel of no signal.
+
+    Examples
+    --------
+    >>> import casadi_gnc
+    >>> mission = casadi_gnc.load("huang2020/detumble").with_scheme("observer_pinv", rate_gain=0.5)
+    >>> mission.scheme().law.rate_gain
+    0.5
     """
 
-    name: str
-    truth: Plant
-    start: list[float]
+    craft: Craft
+    schemes: Sequence[Scheme]
     timing: Timing
-    schemes: tuple[Scheme, ...]
-    metrics: tuple[Metric, ...] = ()
-    funnels: tuple[Funnel, ...] = ()
+    name: str = "mission"
+    metrics: Sequence[Metric] = ()
+    funnels: Sequence[Funnel] = ()
     noise: Noise = Noise()
-    panels: tuple[Panel, ...] = ()
-    target: Mapping[str, Sequence[float]] = field(default_factory=dict)
-    checks: Callable[[Mission, Scheme], Iterable[Check]] = lambda mission, scheme: ()
-    truths: Callable[[Mission, Scheme], Mapping[str, Any]] = lambda mission, scheme: {}
-    notes: tuple[str, ...] = ()
     title: str = ""
     source: str = ""
-    digest: str = ""
+    start_from: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    checks: Sequence[Callable[[Mission, Scheme], Iterable[Check]]] = ()
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
+        held = (
+            each if each.law.hold == hold else replace(each, law=replace(each.law, hold=hold)) for each in self.schemes
+        )
+        object.__setattr__(self, "schemes", tuple(held))
+        object.__setattr__(self, "funnels", tuple(self.funnels))
+        fitting.refuse(self)
+        object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
+
+    @cached_property
+    def truth(self) -> Plant:
+        """The plant: what truly moves, and what the sensors say."""
+        return self.craft.plant()
+
+    @cached_property
+    def start(self) -> list[float]:
+        """The plant's state at t = 0, in its order."""
+        by_signal = {**self.craft.start(), **self.start_from}
+        return [float(value) for name in self.truth.state.names for value in _flat(by_signal[name])]
+
+    @cached_property
+    def target(self) -> Mapping[str, Sequence[float]]:
+        """The states that the laws regulate, by name, and the values that they bring them to."""
+        return self.craft.regulated(self)
+
+    @property
+    def digest(self) -> str:
+        """Hash of what the mission was made of: its file with changes and guests, or its data and classes."""
+        return self.origin.digest if self.origin is not None else _digest(self)
+
+    def quiet(self) -> ca.DM:
+        """Return noise that is zero."""
+        return ca.DM.zeros(self.truth.noise.size)
+
+    def first_measurement(self) -> ca.DM:
+        """Return what perfect sensors say at t = 0, in the plant's order."""
+        return ca.DM(self.truth.measure(0.0, ca.DM(self.start), self.quiet()))
 
     def scheme(self, name: str | None = None) -> Scheme:
         """Return a scheme by name, the first one by default."""
@@ -231,28 +158,52 @@ class Mission:
 
         Raises `LawError` where a law cannot work at that sample period.
         """
-        timing = replace(self.timing, **changes)
-        hold = timing.sample_period if timing.mode == "sampled" else 0.0
-        schemes = tuple(replace(scheme, law=replace(scheme.law, hold=hold)) for scheme in self.schemes)
-        for scheme in schemes:
+        changed = replace(
+            self, timing=replace(self.timing, **changes), origin=self._noted(_keys_of_timing(self, changes))
+        )
+        for scheme in changed.schemes:
             scheme.law.check_hold()
-        return replace(self, timing=timing, schemes=schemes)
+        return changed
 
     def with_scheme(self, name: str | None = None, **changes: Any) -> Mission:
-        """Return the mission with one scheme only, changed: `feedback`, or gains of its law by name."""
+        """Return the mission with one scheme only, changed: `law`, `feedback`, `actuation`, or gains by name."""
         scheme = self.scheme(name)
-        own = {key: changes.pop(key) for key in ("feedback", "actuation", "title") if key in changes}
-        known = {own_field.name for own_field in dataclasses.fields(scheme.law)}
+        own = {key: changes.pop(key) for key in _OF_A_SCHEME if key in changes}
+        law = own.get("law", scheme.law)
+        known = {own_field.name for own_field in dataclasses.fields(law)}
         for key in changes:
             if key not in known:
                 raise FlightError(f"scheme {scheme.name!r} has no {key!r}; its law has {', '.join(sorted(known))}")
-        scheme = replace(scheme, law=replace(scheme.law, **changes), **own)
-        return replace(self, schemes=(scheme,))
+        paths = {f"scheme.{scheme.name}.law.{key}": value for key, value in changes.items()}
+        paths |= {f"scheme.{scheme.name}.{key}": value for key, value in own.items()}
+        changed = replace(scheme, **{**own, "law": replace(law, **changes) if changes else law})
+        return replace(self, schemes=(changed,), origin=self._noted(paths))
+
+    def _noted(self, changes: Mapping[str, Any]) -> Origin | None:
+        """Return where the mission came from with these keys changed; None where no file could say so."""
+        values = {key: plain(value) for key, value in changes.items() if not _is_symbol(value)}
+        if self.origin is None or len(values) < len(changes) or not all(map(_is_data, values.values())):
+            return None
+        return replace(self.origin, changes={**self.origin.changes, **values})
+
+    def with_craft(self, craft: Craft) -> Mission:
+        """Return the mission of another craft; what the schemes believe stays."""
+        return replace(self, craft=craft, origin=None)
+
+    def controller(self, scheme: str | None = None) -> Stepper:
+        """Return the sampled controller of a scheme, to be stepped with measurements from elsewhere.
+
+        Examples
+        --------
+        >>> import casadi_gnc
+        >>> controller = casadi_gnc.load("huang2020/detumble").controller("observer_pinv")
+        >>> controller.step(0.0, mrp=[0.1, 0.0, 0.0], rate=[0.02, -0.01, 0.0])["wanted"].shape
+        (3,)
+        """
+        return Stepper(self, scheme)
 
     def plant(self) -> ca.Function:
         """Return x' as a function (t, x, actuators) -> rate without noise, with the ports of the plant's layouts."""
-        from casadi_gnc.missions import functions
-
         return functions.plant_rate(self)
 
     def law(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
@@ -261,20 +212,14 @@ class Mission:
         `parameters` are symbols that were put in place of gains by `with_scheme`; where there are
         any, the function has them as its last port, p.
         """
-        from casadi_gnc.missions import functions
-
         return functions.law_function(self, self.scheme(scheme), parameters)
 
     def step(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
         """Return one sample of the controller: (t, y, good, m, actuators, [p]) -> (actuators_next, m_next, ...)."""
-        from casadi_gnc.missions import functions
-
         return functions.step_function(self, self.scheme(scheme), parameters)
 
     def loop_start(self, scheme: str | None = None) -> dict[str, ca.DM]:
         """Return x, m, actuators and good at t = 0, as `closed_loop` takes them."""
-        from casadi_gnc.missions import functions
-
         return functions.loop_start(self, self.scheme(scheme))
 
     def closed_loop(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
@@ -285,6 +230,74 @@ class Mission:
         `m_next`, `actuators_next`, `good_next`, `wanted`, `limited`. `loop_start` gives the first values.
         Noise is zero. Only schemes whose allocation is an expression have a closed loop.
         """
-        from casadi_gnc.missions import functions
-
         return functions.closed_loop_function(self, self.scheme(scheme), parameters)
+
+    def __repr__(self) -> str:
+        return on_one_screen(self)
+
+    def __reduce__(self) -> Any:
+        own = {each.name: getattr(self, each.name) for each in dataclasses.fields(self)}
+        try:
+            content = pickle.dumps(own)
+        except Exception as error:  # whatever objects of the user's own do
+            raise FlightError(
+                f"the mission cannot go to another process: {error}. Use methods and classes in the place of lambdas, "
+                "and numbers in the place of symbols"
+            ) from error
+        return _restored, (self.guests(), content)
+
+    def guests(self) -> tuple[GuestFile, ...]:
+        """Return the files of the user's own code from which classes of the mission come."""
+        parts = [(each.law, each.law.belief, each.actuation, each.actuation.allocator) for each in self.schemes]
+        found = guests.files_of(self.craft, self.truth, *(part for each in parts for part in each))
+        named = () if self.origin is None else self.origin.guests
+        return tuple(dict.fromkeys([*named, *found]))
+
+
+def _restored(files: tuple[GuestFile, ...], content: bytes) -> Mission:
+    """Return a mission from a pickle; the code that it needs is run first."""
+    guests.run_all(files)
+    return Mission(**pickle.loads(content))
+
+
+#: Keys of [timing] by the fields of `Timing`.
+_TIMING_KEYS = {
+    "mode": "mode",
+    "sample_period": "sample_period_s",
+    "duration": "duration_s",
+    "substeps": "plant_substeps",
+}
+
+
+def _keys_of_timing(mission: Mission, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changes of the timing as a file has them; what is recorded follows from the sample period."""
+    timing = replace(mission.timing, **changes)
+    keys = {f"timing.{_TIMING_KEYS[name]}": value for name, value in changes.items() if name in _TIMING_KEYS}
+    if "record_every" in changes or (timing.record_every > 1 and "sample_period" in changes):
+        keys["timing.record_period_s"] = timing.record_every * timing.sample_period
+    return keys
+
+
+def _is_symbol(value: Any) -> bool:
+    return isinstance(value, (ca.SX, ca.MX))
+
+
+def _is_data(value: Any) -> bool:
+    """Return whether a value can stand in a file."""
+    if isinstance(value, list):
+        return all(map(_is_data, value))
+    return isinstance(value, (bool, int, float, str))
+
+
+def _flat(values: Any) -> list[float]:
+    return ca.DM(values).nonzeros() if not isinstance(values, (int, float)) else [float(values)]
+
+
+def _digest(mission: Mission) -> str:
+    """Return the hash of a mission that was made from objects: names of classes, data, and guests' code."""
+    told = [f"{type(mission.craft).__qualname__} {mission.craft.model_dump_json()}", repr(mission.timing)]
+    told += [repr(each) for each in (mission.noise, *mission.metrics, *mission.funnels, dict(mission.start_from))]
+    for scheme in mission.schemes:
+        told.append(f"{scheme.name} {scheme.law!r} {scheme.actuation!r} {scheme.feedback}")
+    told += [f"{file.path} {file.sha256}" for file in mission.guests()]
+    return hashlib.sha256("\n".join(told).encode()).hexdigest()

@@ -7,6 +7,7 @@ sees the same numbers.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from casadi_gnc.signals import Layout
@@ -14,7 +15,11 @@ from casadi_gnc.status import StepStatus
 
 
 class Plant:
-    """Base of all plants; a subclass is a frozen dataclass of its physical data."""
+    """Base of all plants; a subclass is a frozen dataclass of its physical data.
+
+    It names its columns (`state`, `measurement`, `inputs`, `noise`, `outputs`) and gives pure functions of
+    CasADi symbols. `rate` must be given; the others have defaults: perfect sensors, no noise.
+    """
 
     @property
     def state(self) -> Layout:
@@ -40,6 +45,10 @@ class Plant:
     def outputs(self) -> Layout:
         """True signals that are recorded besides the state."""
         return Layout()
+
+    def inertias(self) -> Mapping[str, Any]:
+        """Return the inertias, (3, 3), [kg m^2], of the bodies that the plant moves, by what each is of."""
+        return {}
 
     def measure(self, t: Any, x: Any, noise: Any) -> Any:
         """Return what the sensors say at time t [s], a column of `measurement`: the state itself."""

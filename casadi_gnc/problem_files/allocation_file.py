@@ -12,44 +12,29 @@ from typing import Annotated, Any, Literal
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults
 from casadi_gnc.allocation.modes import axis_scale, by_priority
-from casadi_gnc.allocation.wheels import WheelSet, combine
+from casadi_gnc.allocation.wheels import at_speed, combine, wheel_problem
 from casadi_gnc.errors import AllocationError, ProblemError
-from casadi_gnc.mechanics.thrusters import ThrusterGeometry
-from casadi_gnc.problem_files import loading
-from casadi_gnc.problem_files.schema import Format, NonNegative, Orientation, Part, Positive, Rows, Vector, orientation
-from casadi_gnc.tables import matrices
-from casadi_gnc.vehicles.combined_spacecraft.craft import Thrusters
+from casadi_gnc.mechanics.reaction_wheels import WheelArray
+from casadi_gnc.problem_files.document import read_kind
+from casadi_gnc.problem_files.mission_tables import Format
+from casadi_gnc.tables.part import NonNegative, Part, Positive
+from casadi_gnc.tables.thrusters import MountedThrusters
+from casadi_gnc.tables.wheels import Wheels
 
 Number = Annotated[int, Field(ge=1, description="actuators are numbered from 1, in the order of the columns")]
 Table = Annotated[list[list[float]], Field(min_length=1)]
 
 
-class MountedThrusters(Thrusters, Orientation):
-    """Thrusters in the chaser's frame, and how the combined frame lies in it."""
+class SpinningWheels(Wheels):
+    """Reaction wheels, axes in the body frame, and how fast they turn now."""
 
-    centre_of_mass_m: Vector = [0.0, 0.0, 0.0]
-    centre_of_mass_error_m: Vector = Field(default=[0.0, 0.0, 0.0], description="half width of the box of errors")
-
-
-class Wheels(Part):
-    """Reaction wheels, axes in the body frame."""
-
-    axes: Rows
-    inertia_kg_m2: Positive
-    max_torque_N_m: Positive
-    max_speed_rad_per_s: Positive
     speed_rad_per_s: list[float] | None = Field(default=None, description="speeds now; zero if left out")
     desaturation_per_s: NonNegative = Field(default=0.0, description="null-space rate that brings speeds to zero")
-
-    @field_validator("axes")
-    @classmethod
-    def _are_units(cls, value: list[list[float]]) -> list[list[float]]:
-        return [matrices.check_unit(row, f"wheel {i}: ") for i, row in enumerate(value, 1)]
 
 
 class Matrices(Part):
@@ -122,7 +107,7 @@ class AllocationModel(Part):
     sample_period_s: Positive = 0.1
     torque_limit_N_m: list[Positive] | None = Field(default=None, description="box that a law may ask for")
     thrusters: MountedThrusters | None = None
-    wheels: Wheels | None = None
+    wheels: SpinningWheels | None = None
     matrices: Matrices | None = None
     weights: Weights = Weights()
     faults: Faults = Faults()
@@ -177,15 +162,15 @@ class AllocationCase:
 
 def load_allocation(problem: str | Path) -> AllocationCase:
     """Return the case of an allocation file, given by path or shipped name; raise `ProblemError`."""
-    path, text, data = loading.read_kind(problem, "allocation")
-    model: AllocationModel = loading.validated(AllocationModel, data, path, text)
+    document = read_kind(problem, "allocation")
+    model: AllocationModel = document.validated(AllocationModel)
     try:
-        return _build(model, path.stem)
+        return _case(model, document.path.stem)
     except AllocationError as error:
-        raise ProblemError(str(error), path.name) from None
+        raise ProblemError(str(error), document.path.name) from None
 
 
-def _build(model: AllocationModel, name: str) -> AllocationCase:
+def _case(model: AllocationModel, name: str) -> AllocationCase:
     weights = {
         "accuracy_weight": model.weights.accuracy,
         "effort_weight": model.weights.effort,
@@ -244,9 +229,6 @@ def _build(model: AllocationModel, name: str) -> AllocationCase:
 
 
 def _thrusters(model: MountedThrusters, period: float, accuracy: float) -> AllocationProblem:
-    turned = orientation(model)
-    rotation = ca.DM.eye(3) if turned is None else turned
-    mounted = ThrusterGeometry.from_rows(model.positions_m, model.directions)
     half = model.centre_of_mass_error_m
     rate = model.max_force_rate_N_per_s
     common: dict[str, Any] = {
@@ -255,15 +237,15 @@ def _thrusters(model: MountedThrusters, period: float, accuracy: float) -> Alloc
         "max_step": np.inf if rate is None else rate * period,
         "accuracy_weight": accuracy,
     }
-    seen = mounted.seen_from(rotation, model.centre_of_mass_m)
+    rotation = model.matrix()
+    seen = model.mounted().seen_from(rotation, model.centre_of_mass_m)
     if not any(half):
         return AllocationProblem(np.array(seen.effectiveness), **common)
     return AllocationProblem.of_thrusters(seen, rotation, ([-value for value in half], half), **common)
 
 
-def _wheels(model: Wheels, period: float, accuracy: float) -> AllocationProblem:
-    wheels = WheelSet(np.array(model.axes).T, model.inertia_kg_m2, model.max_torque_N_m, model.max_speed_rad_per_s)
+def _wheels(model: SpinningWheels, period: float, accuracy: float) -> AllocationProblem:
+    wheels = WheelArray(ca.DM(model.axes).T, model.inertia_kg_m2, model.max_acceleration, model.max_speed)
     speed = np.zeros(len(model.axes)) if model.speed_rad_per_s is None else np.array(model.speed_rad_per_s)
-    return wheels.at_speed(
-        wheels.problem(accuracy_weight=accuracy), speed, period, desaturation=model.desaturation_per_s
-    )
+    problem = wheel_problem(wheels, accuracy_weight=accuracy)
+    return at_speed(wheels, problem, speed, period, desaturation=model.desaturation_per_s)

@@ -1,166 +1,215 @@
-"""Build a mission from a checked problem file: the craft, its funnel, laws and metrics."""
+"""Build a mission from the checked tables of a file: funnels, timing, noise, schemes, metrics."""
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-from functools import partial
-from pathlib import Path
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
-from casadi_gnc import vehicles as crafts
-from casadi_gnc.errors import LawError, ProblemError
-from casadi_gnc.laws import LAWS, PerformanceFunnel, gains_of
-from casadi_gnc.missions import tapes
-from casadi_gnc.missions.mission import Funnel, Metric, Mission, Noise, Scheme, Timing
-from casadi_gnc.problem_files import schema
-from casadi_gnc.problem_files.toml_place import describe
-from casadi_gnc.vehicles import Craft, Where
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
+from casadi_gnc.missions import fitting
+from casadi_gnc.missions.checks import REGISTRY as CHECKS
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
+from casadi_gnc.missions.timing import Noise, Timing
+from casadi_gnc.problem_files.document import Complaints
+from casadi_gnc.problem_files.mission_tables import FunnelTable, MetricTable, NoiseTable, TimingTable
+from casadi_gnc.tables.part import MisfitError, Part
+
+if TYPE_CHECKING:
+    from casadi_gnc.problem_files.loading import Checked
 
 
-def build(model: Any, path: Path, text: str, *, strict: bool = True) -> Mission:
-    """Return the mission that a checked file describes; path and text serve messages.
+def mission(checked: Checked, *, strict: bool = True) -> Mission:
+    """Return the mission that checked tables describe.
 
     Parameters
     ----------
-    model : the `MissionFile` of a craft.
-    strict : refuse a sample time that a law cannot bear.
+    checked : from `casadi_gnc.problem_files.loading`.
+    strict : refuse what cannot fly.
+
+    Raises
+    ------
+    ProblemError
+        With all that does not fit together.
     """
-    where = partial(describe, path, text)
-    craft: Craft = crafts.module(model.spacecraft.model).build(model, where)
-    _check_start(craft, where)
-    funnels = tuple(_funnel(table, i, craft, where) for i, table in enumerate(model.funnel))
-    given = model.timing
-    kept = round((given.record_period_s or given.sample_period_s) / given.sample_period_s)
-    timing = Timing(given.mode, given.sample_period_s, given.duration_s, given.plant_substeps, kept)
-    schemes = (_scheme(scheme, i, craft, funnels, timing, where, strict) for i, scheme in enumerate(model.scheme))
-    mission = Mission(
-        name=path.stem,
-        truth=craft.plant,
-        start=craft.start,
-        timing=timing,
-        schemes=tuple(schemes),
-        funnels=funnels,
-        noise=_noise(model.noise, timing, where),
-        panels=craft.panels,
-        target=craft.target,
-        checks=craft.checks,
-        truths=craft.truths,
-        notes=craft.notes,
-        title=model.title,
-        source=model.source,
-        digest=hashlib.sha256(text.encode()).hexdigest(),
-    )
-    return _with_metrics(mission, model, where)
-
-
-def _with_metrics(mission: Mission, model: schema.MissionModel, where: Where) -> Mission:
-    """Return the mission with its metrics; each must name a signal that every scheme records."""
+    document, common, craft = checked.document, checked.common, checked.craft
+    complaints = Complaints(document)
+    parts = _Parts(craft)
+    with complaints.about("spacecraft"):
+        parts.ask()
+    complaints.settle()
+    for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
+        complaints.add(misfit.path, str(misfit))
+    timing = _timing(common.timing)
+    funnels = []
+    for i, table in enumerate(common.funnel):
+        with complaints.about("funnel", i):
+            funnels.append(_funnel(table, parts))
+    wrong = {table.signal for table in common.funnel} - {funnel.signal for funnel in funnels}
+    noise = Noise()
+    with complaints.about("noise"):
+        noise = _noise(common.noise, timing)
+    schemes = []
+    for i, (table, law, gains) in enumerate(checked.schemes):
+        if wrong.intersection(law.funnels.values()):
+            continue  # what is wrong with its funnel was said
+        with complaints.about("scheme", i):
+            schemes.append(_scheme(table, law, gains, parts, funnels, timing, strict))
+    further = []
+    for i, name in enumerate(common.checks):
+        with complaints.about("checks", i):
+            further.append(CHECKS.find(name, document.folder))
+    complaints.settle()
+    made = None
+    with complaints.about("spacecraft"):
+        made = Mission(
+            craft,
+            schemes,
+            timing,
+            name=document.path.stem,
+            funnels=funnels,
+            noise=noise,
+            title=common.title,
+            source=common.source,
+            checks=further,
+        )
+    complaints.settle()
+    assert made is not None
     metrics = []
-    for i, metric in enumerate(model.metric):
-        for scheme in mission.schemes:
-            row = tapes.row_layout(mission, scheme)
-            if metric.signal not in row:
-                message = f"{metric.signal!r} is no signal of scheme {scheme.name}; there is {', '.join(row.names)}"
-                raise ProblemError(message, where(("metric", i, "signal")))
-        unit = (
-            "s"
-            if metric.kind in ("settling", "reaching")
-            else tapes.row_layout(mission, mission.schemes[0]).signal(metric.signal).unit
-        )
-        norm = metric.norm or ("two" if metric.kind == "sample_sum" else "max")
-        until = metric.until_s or float("inf")
-        metrics.append(
-            Metric(metric.name, metric.kind, metric.signal, metric.threshold or 0.0, metric.after_s, unit, until, norm)
-        )
-    return dataclasses.replace(mission, metrics=tuple(metrics))
+    for i, table in enumerate(common.metric):
+        with complaints.about("metric", i, "signal"):
+            metrics.append(fitting.complete(made, _metric(table)))
+    complaints.settle()
+    return replace(made, metrics=metrics)
 
 
-def _check_start(craft: Craft, where: Where) -> None:
-    """Refuse a start that the sensors could not measure: a controller has no good value before it."""
-    measured = _first_measurement(craft)
-    for signal in craft.plant.measurement.signals:
-        largest = max(abs(value) for value in measured[craft.plant.measurement.place(signal.name)])
-        if largest > signal.limit:
-            place = where(("initial", craft.start_keys.get(signal.name, "")))
-            raise ProblemError(f"{largest:g} is beyond the largest credible {signal.name}, {signal.limit:g}", place)
+def with_origin(made: Mission, origin: Origin) -> Mission:
+    """Return the mission with the file that it came from."""
+    return replace(made, origin=origin)
 
 
-def _first_measurement(craft: Craft) -> list[float]:
-    quiet = ca.DM.zeros(craft.plant.noise.size)
-    return list(np.array(ca.DM(craft.plant.measure(0.0, ca.DM(craft.start), quiet))).ravel())
+class _Parts:
+    """Ask a craft once for what building a mission needs of it."""
+
+    def __init__(self, craft: Craft) -> None:
+        self.craft = craft
+
+    def ask(self) -> None:
+        """Ask for plant, start and belief."""
+        craft = self.craft
+        self.plant, self.believed = craft.plant(), craft.belief()
+        start = craft.start()
+        self.known = set(start) == set(self.plant.state.names)  # else the mission says what is wrong
+        self.measured: list[float] = []
+        if self.known:
+            x = ca.vertcat(*(ca.DM(start[name]) for name in self.plant.state.names))
+            quiet = ca.DM.zeros(self.plant.noise.size)
+            self.measured = list(np.array(ca.DM(self.plant.measure(0.0, x, quiet))).ravel())
+
+    def incredible(self) -> Iterator[MisfitError]:
+        """Yield starts that the sensors could not measure: a controller has no good value before them."""
+        if not self.known:
+            return
+        layout = self.plant.measurement
+        for signal in layout.signals:
+            largest = max((abs(value) for value in self.measured[layout.place(signal.name)]), default=0.0)
+            if largest > signal.limit:
+                message = f"{largest:g} is beyond the largest credible {signal.name}, {signal.limit:g}"
+                yield MisfitError(message, *self.craft.key_of(signal.name))
 
 
-def _noise(table: schema.NoiseModel, timing: Timing, where: Where) -> Noise:
+def _timing(given: TimingTable) -> Timing:
+    kept = round((given.record_period_s or given.sample_period_s) / given.sample_period_s)
+    return Timing(given.mode, given.sample_period_s, given.duration_s, given.plant_substeps, kept)
+
+
+def _metric(table: MetricTable) -> Metric:
+    norm = table.norm or ("two" if table.kind == "sample_sum" else "max")
+    until = table.until_s or float("inf")
+    return Metric(table.name, table.kind, table.signal, table.threshold or 0.0, table.after_s, "", until, norm)
+
+
+def _noise(table: NoiseTable, timing: Timing) -> Noise:
     """Return how noise is drawn; its period must be a whole number of sample periods."""
     every = 1.0 if table.period_s is None else table.period_s / timing.sample_period
     if every < 0.5 or abs(every - round(every)) > 1e-6 * every:
-        raise ProblemError(
+        raise MisfitError(
             f"period_s is {table.period_s:g}, {every:.6g} times sample_period_s {timing.sample_period:g}; "
             "expected a whole multiple",
-            where(("noise", "period_s")),
+            "period_s",
         )
     return Noise(table.seed, round(every), table.truncation_sigma or float("inf"))
 
 
-def _funnel(table: schema.FunnelModel, index: int, craft: Craft, where: Where) -> Funnel:
+def _funnel(table: FunnelTable, parts: _Parts) -> Funnel:
     """Return one of the mission's funnels; the start must lie inside."""
-    measured = craft.plant.measurement
+    measured = parts.plant.measurement
     if table.signal not in measured:
-        known = ", ".join(measured.names)
-        raise ProblemError(f"{table.signal!r} is not measured; there is {known}", where(("funnel", index, "signal")))
+        raise MisfitError(f"{table.signal!r} is not measured; there is {', '.join(measured.names)}", "signal")
     expected = measured.signal(table.signal).size
     if len(table.start) != expected:
-        place = where(("funnel", index, "start"))
-        raise ProblemError(f"{len(table.start)} axes, but {table.signal} has {expected}", place)
-    start = _first_measurement(craft)[measured.place(table.signal)]
+        raise MisfitError(f"{len(table.start)} axes, but {table.signal} has {expected}", "start")
+    start = parts.measured[measured.place(table.signal)]
     for axis, (s, rho, below, above) in enumerate(zip(start, table.start, table.below, table.above, strict=True), 1):
         if not -below * rho < s < above * rho:
-            raise ProblemError(
+            raise MisfitError(
                 f"axis {axis} starts at {s:g}, outside its funnel from {-below * rho:g} to {above * rho:g}; "
                 "widen start, below or above",
-                where(("funnel", index, "start")),
+                "start",
             )
     columns = (ca.DM(getattr(table, key)) for key in ("start", "floor", "decay_per_s", "below", "above"))
     return Funnel(table.signal, PerformanceFunnel(*columns))
 
 
 def _scheme(
-    model: Any,
-    index: int,
-    craft: Craft,
-    funnels: tuple[Funnel, ...],
-    timing: Timing,
-    where: Where,
-    strict: bool,
+    table: Any, law: type[Law], gains: Part, parts: _Parts, funnels: list[Funnel], timing: Timing, strict: bool
 ) -> Scheme:
-    table: Any = model.law
-    law: Any = LAWS[table.type]
-    named = list(law.errata) if model.as_printed is True else model.as_printed or []
+    """Return a scheme; a `MisfitError` or a `GncError` says what does not fit."""
+    own = type(parts.craft).scheme_keys
+    keys = own.model_construct(**{name: getattr(table, name) for name in own.model_fields})
+    actuation = parts.craft.actuation(keys)
+    why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
+    if why:
+        told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
+        raise MisfitError(f"{told}; `casadi-gnc laws` says which fits what", "law", "type")
+    named = list(law.errata) if table.as_printed is True else table.as_printed or []
     for name in named:
         if name not in law.errata:
             known = ", ".join(law.errata) or "none"
-            message = f"{table.type} has no erratum {name!r}; known: {known}"
-            raise ProblemError(message, where(("scheme", index, "as_printed")))
-    gains = {key: getattr(table, key) for key in gains_of(law)}
-    gains = {key: ca.DM(value) if isinstance(value, list) else value for key, value in gains.items()}
-    hold = timing.sample_period if timing.mode == "sampled" else 0.0
+            raise MisfitError(f"{table.law['type']} has no erratum {name!r}; known: {known}", "as_printed")
+    given: dict[str, Any] = {key: getattr(gains, key) for key in gains_of(law)}
+    given = {key: ca.DM(value) if isinstance(value, list) else value for key, value in given.items()}
     for key, signal in law.funnels.items():
         bounds = next((funnel.bounds for funnel in funnels if funnel.signal == signal), None)
         if bounds is None:
             found = ", ".join(funnel.signal for funnel in funnels) or "none"
-            message = f"the law {table.type!r} needs a [[funnel]] on {signal}, and the file has {found}"
-            raise ProblemError(message, where(("scheme", index, "law")))
-        gains[key] = bounds
-    if "body" in {field.name for field in dataclasses.fields(law)}:
-        gains["body"] = craft.believed
+            raise MisfitError(
+                f"the law {table.law['type']!r} needs a [[funnel]] on {signal}, and the file has {found}", "law"
+            )
+        given[key] = bounds
+    if law.belief_kind() is not None:
+        given["body"] = parts.believed
     try:
-        made = law(hold=hold, printed=frozenset(named), **gains)
+        made = law(hold=timing.sample_period if timing.mode == "sampled" else 0.0, printed=frozenset(named), **given)
         if strict:
             made.check_hold()
-        return Scheme(model.name, made, craft.actuation(model), model.feedback, model.title)
-    except LawError as error:
-        raise ProblemError(str(error), where(("scheme", index, "law"))) from None
+    except ProblemError:
+        raise
+    except Exception as error:
+        raise _about_law(error, law) from error
+    return Scheme(table.name, made, actuation, table.feedback, table.title, keys)
+
+
+def _about_law(error: Exception, law: type[Law]) -> MisfitError:
+    """Return what a law refuses when it is made, in one sentence."""
+    from casadi_gnc import guests
+    from casadi_gnc.errors import GncError
+
+    told = str(error) if isinstance(error, GncError) else f"{law.__name__} cannot be made: {guests.told(error)}"
+    return MisfitError(told, "law")

@@ -2,20 +2,34 @@
 
 A path is written with dots, `truth.inertia_factor`; an item of a list of tables is taken by its name,
 `scheme.funnel_robust.law.attitude_gain`, or by its number from 1, `fault.2.bias_N_m`; `*` stands for
-every item, `scheme.*.force_limit_N.*`.
+every item, `scheme.*.force_limit_N.*`. Where a file is silent and its schema has a default, the default is what
+is changed.
 """
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
+
+from pydantic import BaseModel
+from pydantic_core import PydanticUndefined
 
 from casadi_gnc.errors import ProblemError
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.problem_files.mission_tables import MissionTables
+from casadi_gnc.tables.complaints import near_key
+from casadi_gnc.tables.part import own_tables
 
 
-def changed(data: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of parsed content with some values replaced, or added to tables that are there.
+def changed(data: dict[str, Any], changes: Mapping[str, Any], craft: type[Craft]) -> dict[str, Any]:
+    """Return a copy of parsed content with some values replaced, or put where the file has none.
+
+    Parameters
+    ----------
+    data : of a mission file.
+    changes : values by path.
+    craft : the file's, whose schema says what may be put where the file is silent.
 
     Raises
     ------
@@ -24,31 +38,41 @@ def changed(data: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """
     result = copy.deepcopy(data)
     for path, value in changes.items():
-        _put(result, path.split("."), value, path, "the file")
+        _put(result, path.split("."), value, path, (), craft)
     return result
 
 
-def _put(at: Any, parts: list[str], value: Any, path: str, where: str) -> None:
+def _put(at: Any, parts: list[str], value: Any, path: str, done: tuple[str, ...], craft: type[Craft]) -> None:
     """Set, in place, what the parts of a path lead to."""
     part, rest = parts[0], parts[1:]
-    for key in _keys(at, part, path, where, last=not rest):
+    for key in _keys(at, part, path, done, rest, craft):
         if rest:
-            _put(at[key], rest, value, path, part if where == "the file" else f"{where}.{part}")
+            _put(at[key], rest, value, path, (*done, part), craft)
         else:
             at[key] = copy.deepcopy(value)
 
 
-def _keys(at: Any, part: str, path: str, where: str, *, last: bool) -> list[Any]:
+def _keys(at: Any, part: str, path: str, done: tuple[str, ...], rest: list[str], craft: type[Craft]) -> list[Any]:
     """Return the keys or places that one part of a path stands for."""
     if isinstance(at, list) and at:
-        return list(range(len(at))) if part == "*" else [_number(at, part, path, where)]
-    if isinstance(at, dict) and (part in at or part == "*" or last):
+        return list(range(len(at))) if part == "*" else [_number(at, part, path, done)]
+    if isinstance(at, dict) and (part in at or part == "*"):
         return list(at) if part == "*" else [part]
-    told = f"has no {part!r}, but {', '.join(at)}" if isinstance(at, dict) else f"is {at!r} and has no parts"
-    raise ProblemError(f"{path!r} leads nowhere: {where} {told}")
+    if isinstance(at, dict):
+        known = _schema(craft, done)
+        default = known.get(part, PydanticUndefined)
+        if default is not PydanticUndefined or not known:
+            if rest and default is not PydanticUndefined:
+                at[part] = default
+            if not rest or default is not PydanticUndefined:
+                return [part]
+        told = f"has no {part!r}{near_key(part, list(dict.fromkeys([*at, *known])))}"
+    else:
+        told = f"is {at!r} and has no parts"
+    raise ProblemError(f"{path!r} leads nowhere: {'.'.join(done) or 'the file'} {told}")
 
 
-def _number(items: list[Any], part: str, path: str, where: str) -> int:
+def _number(items: list[Any], part: str, path: str, done: tuple[str, ...]) -> int:
     """Return the place of an item that is given by its name or by its number from 1."""
     names = [item.get("name") if isinstance(item, dict) else None for item in items]
     if part in names:
@@ -57,4 +81,41 @@ def _number(items: list[Any], part: str, path: str, where: str) -> int:
         return int(part) - 1
     known = [name for name in names if name is not None]
     told = f"by name there is {', '.join(known)}" if known else f"there are {len(items)}, from 1"
-    raise ProblemError(f"{path!r} leads nowhere: {where} has no item {part!r}; {told}")
+    raise ProblemError(f"{path!r} leads nowhere: {'.'.join(done)} has no item {part!r}; {told}")
+
+
+def _schema(craft: type[Craft], done: tuple[str, ...]) -> dict[str, Any]:
+    """Return the keys that a table may have with their defaults as a file would write them; empty where unknown."""
+    own = own_tables(craft)
+    top = {**MissionTables.model_fields, **{name: craft.model_fields[name] for name in own}}
+    if not done:
+        return {name: _written(field) for name, field in top.items()}
+    if done[0] == "spacecraft":
+        fields = {name: field for name, field in craft.model_fields.items() if name not in own}
+        models: list[type[BaseModel]] = []
+        done = done[1:]
+        if not done:
+            return {name: _written(field) for name, field in fields.items()}
+        models = _models(fields[done[0]].annotation) if done[0] in fields else []
+    else:
+        models = _models(top[done[0]].annotation) if done[0] in top else []
+    for part in done[1:]:
+        inner = [model.model_fields[part] for model in models if part in model.model_fields]
+        models = [found for field in inner for found in _models(field.annotation)] or models
+    return {name: _written(field) for model in models for name, field in model.model_fields.items()}
+
+
+def _models(annotation: Any) -> list[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for inner in get_args(annotation) for model in _models(inner)]
+
+
+def _written(field: Any) -> Any:
+    """Return a field's default as a file would write it: an empty table for one that must be given."""
+    default = field.get_default(call_default_factory=True)
+    if isinstance(default, BaseModel):
+        return default.model_dump()
+    if default is None or default is PydanticUndefined:
+        return {} if _models(field.annotation) else default
+    return copy.deepcopy(default)

@@ -1,66 +1,50 @@
-"""Read problem files: find, check, and build what they describe."""
+"""Read a mission file: find what it names, check every key, build the mission.
+
+Nothing of a file is used before all of it was looked at: what is wrong is told at once, each with its line.
+"""
 
 from __future__ import annotations
 
-import difflib
-import tomllib
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError, create_model
 
-from casadi_gnc import vehicles as crafts
-from casadi_gnc.errors import ProblemError
-from casadi_gnc.missions.mission import Mission
-from casadi_gnc.problem_files import building, schema, toml_place
+from casadi_gnc import guests
+from casadi_gnc.errors import GncError, ProblemError
+from casadi_gnc.laws import REGISTRY as LAWS
+from casadi_gnc.laws import Law
+from casadi_gnc.missions.craft import REGISTRY as CRAFTS
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.problem_files import building
 from casadi_gnc.problem_files.changing import changed
-from casadi_gnc.system import assets
-from casadi_gnc.system.text import refused
+from casadi_gnc.problem_files.document import Complaints, Document, read_kind
+from casadi_gnc.problem_files.law_tables import law_table
+from casadi_gnc.problem_files.mission_tables import MissionTables, SchemeTable
+from casadi_gnc.tables.complaints import near_key, sentences
+from casadi_gnc.tables.part import Part, own_tables
 
 
-def shipped() -> list[str]:
-    """Return the names of the problems that come with the installation, e.g. "huang2020/detumble"."""
-    root = assets.folder("problems")
-    return sorted(path.relative_to(root).with_suffix("").as_posix() for path in root.rglob("*.toml"))
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """Hold a mission file whose every table was checked.
 
+    Parameters
+    ----------
+    document : as read.
+    common : the tables of every mission.
+    craft : made of its tables.
+    schemes : the table of each scheme, its law's class, and the law's gains.
+    """
 
-def locate(problem: str | Path) -> Path:
-    """Return the path of a problem given by a path or by the name of a shipped one."""
-    path = Path(problem)
-    try:
-        if path.is_file():
-            return path
-        name = path.with_suffix("").as_posix()
-    except (OSError, ValueError) as error:
-        raise ProblemError(f"{str(problem)[:60]!r} names no file: {error}") from None
-    known = shipped()
-    if name.removeprefix("problems/") in known:
-        return assets.folder("problems") / f"{name.removeprefix('problems/')}.toml"
-    near = difflib.get_close_matches(name, known, 1)
-    hint = f'; did you mean "{near[0]}"?' if near else "; `casadi-gnc problems` lists those that are shipped"
-    raise ProblemError(f"no problem file {str(problem)!r}{hint}")
-
-
-def read(problem: str | Path) -> tuple[Path, str, dict[str, Any]]:
-    """Return path, text and parsed content of a problem file; raise `ProblemError` on bad TOML."""
-    path = locate(problem)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
-    character = refused(text)  # in a comment too: the file travels with the packages that are made of it
-    if character:
-        number = next(k for k, line in enumerate(text.split("\n"), 1) if refused(line))
-        raise ProblemError(
-            f"holds the character {character}, which is invisible and can change what a reader takes the rest for; "
-            "leave it out",
-            f"{path.name}, line {number}",
-        )
-    try:
-        return path, text, tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ProblemError(f"is not valid TOML: {error}", path.name) from error
+    document: Document
+    common: MissionTables
+    craft: Craft
+    schemes: list[tuple[Any, type[Law], Part]]
 
 
 def load(problem: str | Path, changes: Mapping[str, Any] | None = None, *, strict: bool = True) -> Mission:
@@ -69,14 +53,15 @@ def load(problem: str | Path, changes: Mapping[str, Any] | None = None, *, stric
     Parameters
     ----------
     problem : path of a TOML file, or the name of a shipped problem such as "huang2020/detumble".
-    changes : values to replace, by their path (see `casadi_gnc.problem_files.changing`), e.g.
-        {"truth.inertia_factor": 1.2, "scheme.observer_pinv.law.rate_gain": 0.5}.
-    strict : refuse a sample time that a law cannot bear; `False` lets `check` say so among other things.
+    changes : values to replace, or to put where the file is silent, by their path (see
+        `casadi_gnc.problem_files.changing`), e.g. {"noise.seed": 3, "scheme.observer_pinv.law.rate_gain": 0.5}.
+    strict : refuse what cannot fly (a sample time that a law cannot bear, actuators that leave an axis out);
+        `False` lets `check` say so among other things.
 
     Raises
     ------
     ProblemError
-        With file, line, key, what was given and what was expected.
+        With a line for each key that is wrong: file, line, key, what was given and what was expected.
 
     Examples
     --------
@@ -84,97 +69,109 @@ def load(problem: str | Path, changes: Mapping[str, Any] | None = None, *, stric
     >>> mission.timing.samples
     15001
     """
-    path, text, data = read_kind(problem, "mission")
+    return load_document(read_kind(problem, "mission"), changes, strict=strict)
+
+
+def load_document(document: Document, changes: Mapping[str, Any] | None = None, *, strict: bool = True) -> Mission:
+    """Return the mission of a document; arguments and errors as for `load`."""
+    changes = changes or {}
+    with guests.recorded() as files:
+        checked = check_tables(document, changes)
+        mission = building.mission(checked, strict=strict)
+    origin = Origin(document.path.name, document.text, dict(changes), tuple(files), document.folder)
+    return building.with_origin(mission, origin)
+
+
+def check_tables(document: Document, changes: Mapping[str, Any]) -> Checked:
+    """Return the tables of a mission file, checked; raise `ProblemError` with all that is wrong."""
+    kind = craft_of(document)
     if changes:
-        data = changed(data, changes)
-        text += "".join(f"\n# {key} = {value!r}" for key, value in sorted(changes.items()))
-    return building.build(check(data, path, text), path, text, strict=strict)
+        document = document.with_data(changed(document.data, changes, kind))
+        kind = craft_of(document)
+    data, complaints = document.data, Complaints(document)
+    own = own_tables(kind)
+    parts = {key: value for key, value in data.items() if key not in ("spacecraft", "scheme", *own)}
+    for key in list(parts):
+        if key not in MissionTables.model_fields:
+            del parts[key]
+            complaints.add((key,), "unknown key" + near_key(key, [*MissionTables.model_fields, *own, "scheme"]))
+    common = complaints.checked(MissionTables, parts)
+    craft = _craft(kind, data, own, complaints)
+    schemes = _schemes(kind, data.get("scheme"), complaints)
+    complaints.settle()
+    assert common is not None
+    assert craft is not None
+    return Checked(document, common, craft, schemes)
 
 
-def read_kind(problem: str | Path, kind: str) -> tuple[Path, str, dict[str, Any]]:
-    """Return path, text and content of a problem file; raise `ProblemError` if it is of another kind."""
-    path, text, data = read(problem)
-    if data.get("kind") != kind:
-        place = toml_place.describe(path, text, ("kind",))
-        raise ProblemError(f'kind is {data.get("kind")!r}; this takes a file of kind "{kind}"', place)
-    return path, text, data
-
-
-def validated(file: Any, data: dict[str, Any], path: Path, text: str) -> Any:
-    """Return the data checked by a pydantic model; raise `ProblemError` with place and remedy."""
+def craft_of(document: Document) -> type[Craft]:
+    """Return the class of the craft that a file names; raise `ProblemError` where there is none."""
+    table = document.data.get("spacecraft")
+    if not isinstance(table, dict) or "model" not in table:
+        what = "the table [spacecraft] is missing" if table is None else "names no craft"
+        raise ProblemError(f'{what}; write model = "..." in it, one of {", ".join(CRAFTS.names())}',
+                           document.place(("spacecraft",)))  # fmt: skip
     try:
-        return file.model_validate(data)
-    except ValidationError as error:
-        raise explain(error, path, text, data, file) from None
+        name = table["model"]
+        found = CRAFTS.find(name if isinstance(name, str) else repr(name), document.folder)
+    except GncError as error:
+        raise ProblemError(str(error), document.place(("spacecraft", "model"))) from error
+    return found if isinstance(found, type) else type(found)
 
 
-def check(data: dict[str, Any], path: Path, text: str) -> Any:
-    """Return the checked `MissionFile` of the craft that the data name; raise `ProblemError`."""
-    table = data.get("spacecraft")
-    name = table.get("model") if isinstance(table, dict) else None
-    if name is not None and name not in crafts.names():
-        place = toml_place.describe(path, text, ("spacecraft", "model"))
-        raise ProblemError(f"{name!r} is no craft; there is {', '.join(crafts.names())}", place)
-    return validated(crafts.module(name or crafts.names()[0]).MissionFile, data, path, text)
+def _craft(kind: type[Craft], data: dict[str, Any], own: list[str], complaints: Complaints) -> Craft | None:
+    """Return the craft made of [spacecraft] and its own tables, None where something is wrong with them."""
+    table = {key: value for key, value in data["spacecraft"].items() if key != "model"}
+    given = {name: data[name] for name in own if name in data}
+    for key in table:
+        if key in own:
+            complaints.add(("spacecraft", key), f"unknown key; [{key}] is a table of its own, not one of [spacecraft]")
+    try:
+        return kind(**{**{key: value for key, value in table.items() if key not in own}, **given})
+    except ProblemError as error:
+        if not isinstance(error.__cause__, ValidationError):
+            raise
+        for path, message in sentences(error.__cause__, kind, {**table, **given}):
+            complaints.add(path if path and path[0] in own else ("spacecraft", *path), message)
+    except TypeError as error:  # keys that are no identifiers of Python
+        complaints.add(("spacecraft",), str(error))
+    return None
 
 
-def explain(error: ValidationError, path: Path, text: str, data: dict[str, Any], top: Any) -> ProblemError:
-    """Return the first complaint of pydantic as one sentence with its place in the file."""
-    problems = error.errors(include_url=False)
-    # A misspelled key leaves the right one missing; the misspelling is what to show.
-    first = min(problems, key=lambda problem: problem["type"] != "extra_forbidden")
-    key: list[str | int] = []
-    at: Any = data
-    part: Any
-    for part in first["loc"]:
-        # Locations of unions also name the alternative that was tried; those are not in the file.
-        inside = (isinstance(at, dict) and part in at) or (isinstance(at, list) and isinstance(part, int))
-        if inside:
-            at = at[part]
-        elif part != first["loc"][-1] or first["type"] not in ("missing",):
+@lru_cache(maxsize=64)
+def scheme_table(kind: type[Craft]) -> type[SchemeTable]:
+    """Return the model of a [[scheme]] that flies a craft."""
+    return create_model("Scheme", __base__=(SchemeTable, kind.scheme_keys), __doc__=SchemeTable.__doc__)
+
+
+def _schemes(kind: type[Craft], tables: Any, complaints: Complaints) -> list[tuple[Any, type[Law], Part]]:
+    """Return the schemes' tables with their laws and gains; those that are wrong are noted and left out."""
+    if not isinstance(tables, list) or not tables:
+        complaints.add(("scheme",), "is missing; write one [[scheme]] or more")
+        return []
+    found, names = [], []
+    for i, table in enumerate(tables):
+        model = complaints.checked(scheme_table(kind), table, ("scheme", i))
+        law = _law(table.get("law"), complaints, ("scheme", i, "law")) if isinstance(table, dict) else None
+        if model is None or law is None:
             continue
-        key.append(part)
-    if first["type"] == "extra_forbidden":
-        message = "unknown key" + _near_key(str(key[-1]), first["loc"], top)
-    elif first["type"] == "missing":
-        message = "is missing"
-    elif first["type"] == "value_error":
-        message = str(first.get("ctx", {}).get("error", first["msg"]))
-    else:
-        message = first["msg"][0].lower() + first["msg"][1:]
-        if not isinstance(at, (dict, list)):
-            message += f", got {at!r}"
-        if first["type"] == "list_type" and isinstance(key[-1], int):
-            message += "; a matrix is written as rows, [[a, 0, 0], [0, b, 0], [0, 0, c]]"
-    if first["type"] == "union_tag_invalid":
-        told: Any = first.get("ctx", {})
-        kinds = told["expected_tags"].replace("'", "").split(", ")
-        near = difflib.get_close_matches(str(told["tag"]), kinds, 1)
-        kind = told["discriminator"].strip("'")
-        message = f"unknown {kind} {told['tag']!r}"
-        message += f"; did you mean {near[0]}?" if near else f"; known: {', '.join(kinds)}"
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-    return ProblemError(message + more, toml_place.describe(path, text, tuple(key)))
+        if model.name in names:
+            complaints.add(("scheme", i, "name"), f"the name {model.name!r} is given twice")
+        names.append(model.name)
+        found.append((model, *law))
+    return found
 
 
-def _near_key(key: str, location: tuple[str | int, ...], top: Any) -> str:
-    """Return a hint at the key that was probably meant."""
-    model: Any = top
-    for part in location[:-1]:
-        if (
-            isinstance(part, str)
-            and isinstance(model, type)
-            and issubclass(model, BaseModel)
-            and part in model.model_fields
-        ):
-            kinds = [model.model_fields[part].annotation]
-            while kinds and not (isinstance(kinds[0], type) and issubclass(kinds[0], BaseModel)):
-                kinds = [*getattr(kinds[0], "__args__", ()), *kinds[1:]]
-            if not kinds:
-                break
-            # In a union the table itself tells which alternative is meant.
-            model = kinds[0]
-        elif isinstance(part, str) and part in schema.LAW_MODELS:
-            model = schema.LAW_MODELS[part]
-    near = difflib.get_close_matches(key, list(model.model_fields), 1)
-    return f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(model.model_fields)}"
+def _law(table: Any, complaints: Complaints, key: tuple[str | int, ...]) -> tuple[type[Law], Part] | None:
+    """Return class and gains of the law that a table names."""
+    if not isinstance(table, dict):
+        return None  # said by the scheme's own table
+    if not isinstance(table.get("type"), str):
+        complaints.add((*key, "type"), f"is missing; it names the law, one of {', '.join(LAWS.names())}")
+        return None
+    with complaints.about(*key, "type"):
+        law = LAWS.find(table["type"], complaints.folder)
+        given = {name: value for name, value in table.items() if name != "type"}
+        gains = complaints.checked(law_table(law), given, key)
+        return None if gains is None else (law, gains)
+    return None

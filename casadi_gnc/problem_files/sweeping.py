@@ -15,8 +15,8 @@ from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.flying import fly
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.problem_files import building, loading, toml_place
-from casadi_gnc.problem_files.changing import changed
+from casadi_gnc.problem_files.document import read_kind
+from casadi_gnc.problem_files.loading import check_tables, load_document
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system.files import write_beside
 
@@ -54,18 +54,14 @@ def load_sweeps(problem: str | Path) -> tuple[Sweep, ...]:
     ProblemError
         For a bad file, a key that leads nowhere, a value that the file cannot have, a result that no flight has.
     """
-    path, text, data = loading.read_kind(problem, "mission")
+    document = read_kind(problem, "mission")
     sweeps = []
-    for i, table in enumerate(loading.check(data, path, text).sweep):
-        place = toml_place.describe(path, text, ("sweep", i))
+    for i, table in enumerate(check_tables(document, {}).common.sweep):
+        place = document.place(("sweep", i))
         missions = []
         for number, value in enumerate(table.values, 1):
             try:
-                copy = changed(data, {table.key: value})
-            except ProblemError as error:
-                raise ProblemError(str(error), place) from None
-            try:
-                mission = building.build(loading.check(copy, path, text), path, text)
+                mission = load_document(document, {table.key: value})
             except ProblemError as error:
                 raise ProblemError(f"with {table.key} = {value!r}: {error}", place) from None
             missions.append(replace(mission, name=f"{mission.name}_{table.name}_{number}"))

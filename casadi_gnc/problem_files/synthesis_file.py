@@ -1,135 +1,25 @@
 """Problem files of kind "synthesis": a recipe, its matrices, and what is asked of the gains.
 
-`[recipe]` names one of `casadi_gnc.synthesis` and gives its arguments under the names of the recipe's
-function, matrices as rows. `synthesize` runs it; what failed certification is never returned as gains.
+`[recipe]` names one of `casadi_gnc.problem_files.synthesis_recipes` and gives its keys. `synthesize` runs it; what
+failed certification is never returned as gains.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from casadi_gnc.errors import ProblemError, SynthesisError
-from casadi_gnc.problem_files import loading
-from casadi_gnc.problem_files.schema import Format, NonNegative, Part, Positive
-from casadi_gnc.problem_files.toml_place import describe
-
-Table = Annotated[list[list[float]], Field(min_length=1)]
-
-
-HalfWidths = Annotated[
-    list[NonNegative] | None, Field(description="of a box of starts of the state about zero, instead of vertices")
-]
-
-
-def _one_of_starts(part: Any) -> Any:
-    if part.vertices is not None and part.half_widths is not None:
-        raise ValueError("give either vertices or half_widths, not both")
-    return part
-
-
-class StateFeedback(Part):
-    """u = -K x with the smallest H-infinity norm from w to z = C x + D u + F w."""
-
-    type: Literal["state_feedback"]
-    A: Table
-    B: Table
-    E: Table
-    C: Table
-    D: Table
-    F: Table | None = None
-    gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
-    slack: Positive = 0.02
-    margin: Positive = 1e-7
-    fastest_rad_s: Positive | None = Field(default=None, description="largest distance of a pole from zero")
-    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
-    half_widths: HalfWidths = None
-    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
-
-    @model_validator(mode="after")
-    def _starts(self) -> StateFeedback:
-        return _one_of_starts(self)
-
-
-class Observer(Part):
-    """L of an observer with the smallest H-infinity norm from w to G times the error."""
-
-    type: Literal["observer"]
-    A: Table
-    C: Table
-    E: Table
-    F: Table
-    G: Table | None = None
-    gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
-    slack: Positive = 0.02
-    margin: Positive = 1e-7
-    fastest_rad_s: Positive | None = Field(default=None, description="largest distance of a pole from zero")
-
-
-class InputEllipsoid(Part):
-    """u = -K x that decays as asked from a box of starts and keeps the command within a limit."""
-
-    type: Literal["input_ellipsoid"]
-    A: Table
-    B: Table
-    vertices: Table | None = Field(default=None, description="starts, one a row; or give half_widths")
-    half_widths: HalfWidths = None
-    limit: Positive
-    decay_1_s: NonNegative
-    per_channel: bool = False
-    margin: Positive = 1e-7
-
-    @model_validator(mode="after")
-    def _starts(self) -> InputEllipsoid:
-        if self.vertices is None and self.half_widths is None:
-            raise ValueError("give vertices or half_widths: the starts from which the command is kept small")
-        return _one_of_starts(self)
-
-
-class IntermediateObserver(Part):
-    """K and L of the intermediate-observer pair with the smallest certified gamma."""
-
-    type: Literal["intermediate_observer"]
-    A: Table
-    B: Table
-    C: Table | None = None
-    varpi: Positive
-    s: Positive = Field(default=0.3, description="where X1^2 is replaced by its tangent")
-    margin: Positive = 1e-6
-    largest_gamma: Positive = 1e4
-    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
-    half_widths: HalfWidths = None
-    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
-
-    @model_validator(mode="after")
-    def _starts(self) -> IntermediateObserver:
-        return _one_of_starts(self)
-
-
-class Theorem1(Part):
-    """Theorem 1 of Shi et al. (2020) as printed."""
-
-    type: Literal["shi2020_theorem1"]
-    A: Table
-    B: Table
-    C: Table
-    M0: Table
-    varpi: Positive
-    alpha: Positive
-    limit: Positive
-    start: Annotated[list[Positive], Field(min_length=3, max_length=3)]
-    kappa3: Positive
-    price: NonNegative = Field(default=0.0, description="of the squares of W and H, added to gamma_2")
-    margin: Positive = 1e-6
-
-
-Recipe = Annotated[
-    StateFeedback | Observer | InputEllipsoid | IntermediateObserver | Theorem1, Field(discriminator="type")
-]
+from casadi_gnc.problem_files.document import Complaints, read_kind
+from casadi_gnc.problem_files.mission_tables import Format
+from casadi_gnc.problem_files.synthesis_recipes import REGISTRY as RECIPES
+from casadi_gnc.problem_files.synthesis_recipes import Recipe
+from casadi_gnc.synthesis import LmiAnswer, backends
+from casadi_gnc.tables.part import Part
 
 
 class SynthesisModel(Part):
@@ -139,39 +29,51 @@ class SynthesisModel(Part):
     kind: Literal["synthesis"]
     title: str = ""
     source: str = ""
-    backend: Literal["clarabel", "scs", "barrier"] = "clarabel"
-    recipe: Recipe
+    backend: str = Field(default="clarabel", description='clarabel, scs, barrier, or "./file.py:NAME"')
+    recipe: dict[str, Any] = Field(description="type names the recipe, the other keys are its own")
 
 
 @dataclass(frozen=True, eq=False)
 class SynthesisCase:
-    """Hold what a synthesis file describes: the recipe's name and arguments, and the back end."""
+    """Hold what a synthesis file describes: the recipe with its matrices, and the back end."""
 
     name: str
     title: str
-    recipe: str
-    arguments: dict[str, Any]
-    backend: str
+    recipe: Recipe
+    backend: Any
 
 
 def load_synthesis(problem: str | Path) -> SynthesisCase:
     """Return the case of a synthesis file, given by path or shipped name; raise `ProblemError`."""
-    path, text, data = loading.read_kind(problem, "synthesis")
-    model: SynthesisModel = loading.validated(SynthesisModel, data, path, text)
-    given = {key: value for key, value in model.recipe if value is not None and key != "type"}
-    arguments = {key: _array(value, describe(path, text, ("recipe", key))) for key, value in given.items()}
-    return SynthesisCase(path.stem, model.title, model.recipe.type, arguments, model.backend)
+    document = read_kind(problem, "synthesis")
+    complaints = Complaints(document)
+    model = complaints.checked(SynthesisModel, document.data)
+    table = document.data.get("recipe")
+    recipe, backend = None, None
+    if isinstance(table, dict):
+        recipe = _recipe(table, complaints)
+    if model is not None:
+        with complaints.about("backend"):
+            backend = backends.REGISTRY.find(model.backend, document.folder)
+    complaints.settle()
+    assert model is not None
+    assert recipe is not None
+    named = model.backend if model.backend in backends.names() else backend
+    return SynthesisCase(document.path.stem, model.title, recipe, named)
 
 
-def _array(value: Any, place: str) -> Any:
-    if not (isinstance(value, list) and isinstance(value[0], list)):
-        return value
-    if len({len(row) for row in value}) > 1:
-        raise ProblemError(f"rows of different length: {', '.join(str(len(row)) for row in value)}", place)
-    return np.array(value)
+def _recipe(table: dict[str, Any], complaints: Complaints) -> Recipe | None:
+    """Return the recipe of a table, None where something is wrong with it."""
+    if not isinstance(table.get("type"), str):
+        complaints.add(("recipe", "type"), f"is missing; it names the recipe, one of {', '.join(RECIPES.names())}")
+        return None
+    with complaints.about("recipe", "type"):
+        kind = RECIPES.find(table["type"], complaints.folder)
+        return complaints.checked(kind, {key: value for key, value in table.items() if key != "type"}, ("recipe",))
+    return None
 
 
-def synthesize(case: SynthesisCase, backend: str | None = None) -> dict[str, Any]:
+def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
     """Return what a recipe found, as plain data with its certificate.
 
     Keys: status, sentence, certified, gains (empty unless certified), promised and true norm, poles, peak
@@ -182,25 +84,12 @@ def synthesize(case: SynthesisCase, backend: str | None = None) -> dict[str, Any
     ProblemError
         For matrices that do not fit each other, by the recipe's words.
     """
-    from casadi_gnc import synthesis
-    from casadi_gnc.synthesis.recipes.shi2020_theorem1 import theorem1
-
-    arguments = dict(case.arguments, backend=backend or case.backend)
-    if "half_widths" in arguments:
-        half = np.array(arguments.pop("half_widths"))
-        arguments["vertices"] = synthesis.box_vertices(-half, half)
-    recipes = {
-        "state_feedback": synthesis.state_feedback,
-        "observer": synthesis.observer,
-        "input_ellipsoid": synthesis.input_ellipsoid,
-        "intermediate_observer": synthesis.intermediate_observer,
-    }
     try:
-        if case.recipe == "shi2020_theorem1":
-            return {"problem": case.name, **_inequalities(theorem1(**arguments))}
-        found = recipes[case.recipe](**arguments)
+        found = case.recipe.run(backend or case.backend)
     except SynthesisError as error:
         raise ProblemError(str(error), case.name) from None
+    if isinstance(found, LmiAnswer):
+        return {"problem": case.name, **_inequalities(found)}
     data: dict[str, Any] = {"problem": case.name, **_inequalities(found.lmis)}
     data.update(status=found.status.name, sentence=found.sentence(), certified=found.is_certified)
     data["gains"] = {name: gain.tolist() for name, gain in found.gains.items()} if found.is_certified else {}

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.mission import Mission, Panel
-from casadi_gnc.missions.tapes import funnel_signals
+from casadi_gnc.missions.loop import funnel_signals
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.panel import Panel
 from casadi_gnc.system.files import write_beside
 from casadi_gnc.system.text import picture
 
@@ -30,9 +31,10 @@ _FONT = 12
 
 def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
     """Draw one flight as `<scheme>.png`, a panel for each of the mission's, and return its path."""
-    figure, axes = _figure(len(mission.panels), height=2.8 * len(mission.panels))
+    panels = mission.craft.panels(mission)
+    figure, axes = _figure(len(panels), height=2.8 * len(panels))
     draw = {"tracked": _tracked, "effort": _effort, "actuators": _actuators, "lines": _signal}
-    for panel, each in zip(mission.panels, axes, strict=True):
+    for panel, each in zip(panels, axes, strict=True):
         draw[panel.kind](each, mission, flight, panel)
     figure.suptitle(
         picture(f"{mission.title}\n{flight.title}" if mission.title else flight.title),
@@ -62,7 +64,7 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
         for number, funnel in enumerate(mission.funnels)
     ]
     if not wanted:
-        for panel in (panel for panel in mission.panels if panel.kind == "tracked"):
+        for panel in (panel for panel in mission.craft.panels(mission) if panel.kind == "tracked"):
             level = next(iter(_thresholds(mission, panel.signal)), None)
             unit = flights[0].unit(panel.signal)
             told = "" if level is None else f"settled below {level:g} {unit}".rstrip(" -")

@@ -155,7 +155,7 @@ class Lmis:
 
     def attempt(self, data: ConicData, backend: Any = "clarabel", **options: Any) -> LmiAnswer:
         """Return the certified answer to conic data of these unknowns, as `data` returns."""
-        module = backends.module(backend) if isinstance(backend, str) else backend
+        module = backends.module(backend)
         scaled = scale(data)
         natural = scaled.unit
         try:

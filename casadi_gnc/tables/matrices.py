@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from pydantic import AfterValidator
+
+from casadi_gnc.tables.part import Matrix
 
 Rows = list[list[float]]
 
@@ -51,3 +56,7 @@ def check_unit(vector: list[float], prefix: str = "") -> list[float]:
     if abs(length - 1) > ROTATION_TOLERANCE:
         raise ValueError(f"{prefix}a direction of length {length:.4g}, expected a unit vector")
     return vector
+
+
+#: An inertia matrix that a body can have, [kg m^2].
+Inertia = Annotated[Matrix, AfterValidator(check_inertia)]

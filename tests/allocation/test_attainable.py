@@ -21,14 +21,14 @@ from casadi_gnc.allocation.zonotope import Zonotope
 from casadi_gnc.errors import AllocationError
 from casadi_gnc.mechanics.attitude import frame_rotation
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
 #: Both ways end at the feasibility tolerance of the linear program, 1e-10 of the full effort.
 CLOSE = {"rtol": 1e-8, "atol": 1e-9}
 
 
 def huang(error: float = 5e-3) -> AllocationProblem:
-    _, _, data = read("huang2020/detumble")
+    data = read("huang2020/detumble").data
     mounted = data["spacecraft"]["thrusters"]
     rotation = frame_rotation(np.pi / 4, np.pi / 7, np.pi / 3)
     geometry = ThrusterGeometry.from_rows(mounted["positions_m"], mounted["directions"]).seen_from(rotation, [0.05] * 3)

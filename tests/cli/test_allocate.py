@@ -167,9 +167,9 @@ def test_bad_input_is_told(commands, tmp_path):
     ],
 )  # fmt: skip
 def test_bad_files_are_told(tmp_path, change, message):
-    from casadi_gnc.problem_files.loading import read
+    from casadi_gnc.problem_files.document import read
 
-    _, text, _ = read(CASE)
+    text = read(CASE).text
     path = tmp_path / "bad.toml"
     assert change[0] in text
     path.write_text(text.replace(*change, 1))
@@ -177,9 +177,9 @@ def test_bad_files_are_told(tmp_path, change, message):
 
 
 def test_options_of_the_file_are_used(tmp_path):
-    from casadi_gnc.problem_files.loading import read
+    from casadi_gnc.problem_files.document import read
 
-    _, text, _ = read(CASE)
+    text = read(CASE).text
     path = tmp_path / "options.toml"
     path.write_text(text.replace("[weights]", "[options]\nkeep_direction = true\n[weights]"))
     done = run(str(path), "--stream", "--json", given="3e-3,0,0\n")
@@ -219,9 +219,9 @@ def test_table_with_byte_order_mark_and_blank_lines(tmp_path):
 
 
 def test_priorities_do_not_change_what_can_be_attained(tmp_path):
-    from casadi_gnc.problem_files.loading import read
+    from casadi_gnc.problem_files.document import read
 
-    _, text, _ = read(CASE)
+    text = read(CASE).text
     path = tmp_path / "priorities.toml"
     path.write_text(text.replace("[weights]", "[options]\npriorities = [0, 1, 1]\n[weights]"))
     shares = []

@@ -98,13 +98,13 @@ def test_fly_options(problem, tmp_path, options):
 def test_schema_accepts_the_shipped_problems():
     import tomllib
 
-    from casadi_gnc.problem_files.loading import read
+    from casadi_gnc.problem_files.document import read
 
     schema = json.loads(run("schema").stdout)
     assert schema["$schema"].endswith("2020-12/schema")
     jsonschema = pytest.importorskip("jsonschema")
     for name in casadi_gnc.shipped():
-        _, text, _ = read(name)
+        text = read(name).text
         jsonschema.validate(tomllib.loads(text), schema)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate({**tomllib.loads(text), "mood": 1}, schema)
@@ -225,6 +225,6 @@ def test_long_flight_shows_progress_on_a_terminal(tmp_path):
 
 
 def casadi_problem_text() -> str:
-    from casadi_gnc.problem_files.loading import read
+    from casadi_gnc.problem_files.document import read
 
-    return read("huang2020/detumble")[1]
+    return read("huang2020/detumble").text

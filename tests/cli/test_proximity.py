@@ -7,10 +7,10 @@ import sys
 
 import pytest
 
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
-_, PRINTED, _ = read("sun2018/as_printed")
-_, LOW, _ = read("sun2018/circular_orbit")
+PRINTED = read("sun2018/as_printed").text
+LOW = read("sun2018/circular_orbit").text
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
 PROGRAM = [sys.executable, "-m", "casadi_gnc.cli.main", "synthesize"]
 
@@ -29,7 +29,7 @@ def test_repaired_synthesis_is_certified():
     assert all(one["rounding"] < one["smallest"] for one in found["constraints"])
     assert found["norm"]["lower"] <= found["norm"]["upper"] <= found["promised_norm"]
     assert max(pole[0] for pole in found["poles_rad_s"]) < 0
-    recipe = read("shi2020/synthesis")[2]["recipe"]
+    recipe = read("shi2020/synthesis").data["recipe"]
     closed = np.array(recipe["A"]) - np.array(recipe["B"]) @ np.array(found["gains"]["K"])
     assert np.linalg.eigvals(closed).real.max() < 0
     # Simulated apart: the command from the worst vertex, and the loop with the input matrix r times the assumed one.

@@ -3,15 +3,16 @@
 from functools import cache
 
 import casadi_gnc
-from casadi_gnc.laws import LAWS, Law
-from casadi_gnc.missions.mission import Mission, Scheme
-from casadi_gnc.problem_files.loading import read, shipped
+from casadi_gnc.laws import REGISTRY, Law
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.problem_files.document import read, shipped
 
 
 @cache
 def missions() -> dict[str, Mission]:
     """Return all shipped missions by name, loaded once."""
-    return {name: casadi_gnc.load(name, strict=False) for name in shipped() if read(name)[2]["kind"] == "mission"}
+    return {name: casadi_gnc.load(name, strict=False) for name in shipped() if read(name).data["kind"] == "mission"}
 
 
 @cache
@@ -27,4 +28,4 @@ def flown_by() -> dict[str, tuple[Mission, Scheme]]:
 
 
 def name_of(law: Law) -> str:
-    return next(name for name, kind in LAWS.items() if type(law) is kind)
+    return REGISTRY.name_of(type(law))

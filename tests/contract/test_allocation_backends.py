@@ -272,8 +272,7 @@ def fake(monkeypatch):
 
     def register(find, capabilities=Capability.ROBUST | Capability.EXACT):
         home = BackEnd(capabilities, (), (1e-6, 1e-10), lambda problem: SimpleNamespace(find=find))
-        monkeypatch.setitem(sys.modules, "casadi_gnc.allocation.backends.fake_", SimpleNamespace(FAKE=home))
-        monkeypatch.setitem(backends._HOMES, "fake", "fake_:FAKE")
+        monkeypatch.setitem(backends.REGISTRY._registered, "fake", home)
 
     return register
 

@@ -13,9 +13,9 @@ import pytest
 import casadi_gnc
 
 ROOT = Path(casadi_gnc.__file__).parent
-#: Single modules at the top are the language of the house; every other room stands on those above it here.
+#: Single modules at the top are the language of the house; every room stands on those with smaller numbers.
 FLOORS = {
-    **{path.stem: 0 for path in ROOT.glob("*.py")},
+    **{path.stem: 0 for path in ROOT.glob("*.py") if path.stem not in ("__init__", "testing")},
     "mathematics": 1,
     "system": 1,
     "mechanics": 2,
@@ -23,15 +23,17 @@ FLOORS = {
     "allocation": 3,
     "synthesis": 3,
     "embedded": 4,
+    "tables": 4,
     "missions": 5,
-    "tables": 6,
     "checking": 6,
-    "vehicles": 8,
-    "problem_files": 7,
+    "vehicles": 7,
+    "problem_files": 8,
     "reports": 9,
     "delivery": 9,
     "benchmarks": 10,
     "fidelity": 10,
+    "starters": 10,
+    "testing": 10,
     "cli": 11,
 }
 MODULES = sorted(ROOT.rglob("*.py"))

@@ -1,4 +1,4 @@
-"""What every law must keep, whoever wrote it. A new law is tested by being in LAWS and in a shipped mission."""
+"""What every law must keep, whoever wrote it. A new law is tested by being in the registry and in a shipped mission."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from shipped_missions import flown_by
 
-from casadi_gnc.laws import LAWS, advance, gains_of
-from casadi_gnc.missions import tapes
+from casadi_gnc.laws import REGISTRY, advance, gains_of
+from casadi_gnc.missions.loop import Loop
 
 ATTITUDE = ("rate_damping", "attitude_pd", "detumble", "prescribed_performance")
 
@@ -17,7 +17,7 @@ def values(expression) -> np.ndarray:
     return np.array(ca.DM(expression)).ravel()
 
 
-@pytest.fixture(params=sorted(LAWS))
+@pytest.fixture(params=sorted(REGISTRY.shipped()))
 def name(request):
     return request.param
 
@@ -33,7 +33,7 @@ def y(name):
     mission, scheme = flown_by()[name]
     quiet = ca.DM.zeros(mission.truth.noise.size)
     measured = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), quiet))
-    return ca.DM(tapes.law_inputs(mission, scheme, measured))
+    return ca.DM(Loop(mission, scheme).seen(measured))
 
 
 def test_sizes_fit_the_layouts(name, law, y):
@@ -91,12 +91,12 @@ def test_everything_is_symbolic_and_differentiable_by_every_gain(name, y):
 
 
 def test_errata_say_what_they_are(name):
-    assert all(len(sentence) > 20 for sentence in LAWS[name].errata.values())
-    assert LAWS[name].__doc__
+    assert all(len(sentence) > 20 for sentence in REGISTRY.find(name).errata.values())
+    assert REGISTRY.find(name).__doc__
 
 
 def test_gains_name_unit_and_meaning(name):
-    for declared in gains_of(LAWS[name]).values():
+    for declared in gains_of(REGISTRY.find(name)).values():
         assert declared.metadata["unit"] or "choices" in declared.metadata
         assert declared.metadata["note"]
 

@@ -8,13 +8,13 @@ import pytest
 from packages import copied, made, run
 
 import casadi_gnc
-from casadi_gnc.delivery.describing import describe
-from casadi_gnc.delivery.vectors import fly_package, sampled
+from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import compare, package
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.machine import Machine
-from casadi_gnc.problem_files.loading import read, shipped
+from casadi_gnc.missions.onboard import describe, sampled
+from casadi_gnc.problem_files.document import read, shipped
 
 STRICT = ("-O1", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-pedantic", "-Werror")
 STEPS, SPOILED = 60, 12
@@ -24,7 +24,7 @@ def kinds():
     """Return one shipped scheme of each pair of a law, as printed or not, and a kind of allocation."""
     found = {}
     for name in shipped():
-        if read(name)[2].get("kind") != "mission":
+        if read(name).data.get("kind") != "mission":
             continue
         for scheme in casadi_gnc.load(name).schemes:
             law, allocator = type(scheme.law).__name__, type(scheme.actuation.allocator).__name__

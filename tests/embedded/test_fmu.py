@@ -13,7 +13,7 @@ from packages import STRICT, made, run
 
 import casadi_gnc
 from casadi_gnc.delivery.fmu import generate_fmu
-from casadi_gnc.delivery.packaging import read_vectors
+from casadi_gnc.delivery.verifying import read_vectors
 from casadi_gnc.embedded import compare
 from casadi_gnc.errors import CompilerError, OutputError
 

@@ -9,7 +9,7 @@ import pytest
 from packages import C99, STRICT, copied, made, run, units
 
 import casadi_gnc
-from casadi_gnc.delivery.packaging import read_vectors
+from casadi_gnc.delivery.verifying import read_vectors
 from casadi_gnc.embedded import compare
 
 SLEW = ("huang2020/slew", "funnel_pinv")
@@ -216,8 +216,8 @@ def test_tunable_gains_stay_variables(tmp_path):
     assert values["unconfigured hash"] == values["default hash"]
     assert values["refused hash"] == values["changed hash"] != values["default hash"]
     # The same measurements through CasADi's machine, with the gain folded.
-    from casadi_gnc.delivery.describing import describe
     from casadi_gnc.embedded.machine import Machine
+    from casadi_gnc.missions.onboard import describe
 
     mission = casadi_gnc.load("huang2020/slew").with_scheme("funnel_pinv", rate_gain=2.5)
     inputs, _ = read_vectors(folder, "float64")

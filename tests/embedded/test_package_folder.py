@@ -10,12 +10,13 @@ from packages import copied, made, run
 
 import casadi_gnc
 from casadi_gnc.delivery import packaging
-from casadi_gnc.delivery.describing import describe
-from casadi_gnc.delivery.packaging import generate, read_vectors, verify
+from casadi_gnc.delivery.packaging import generate
+from casadi_gnc.delivery.verifying import read_vectors, verify
 from casadi_gnc.embedded import package
 from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.errors import CompilerError, OutputError, PackageError, PrinterError, TargetError
-from casadi_gnc.laws import LAWS
+from casadi_gnc.laws import REGISTRY
+from casadi_gnc.missions.onboard import describe
 
 PLAIN = ("huang2020/slew", "pd_pinv")
 
@@ -143,7 +144,7 @@ def test_scheme_that_cannot_fly(tmp_path):
 
 def test_operation_without_a_c_form(tmp_path, monkeypatch):
 
-    law = LAWS["attitude_pd"]
+    law = REGISTRY.find("attitude_pd")
     command = law.command
     monkeypatch.setattr(law, "command", lambda self, t, y, m: ca.erf(command(self, t, y, m)))
     with pytest.raises(PrinterError, match="'erf' has no C form"):
@@ -152,7 +153,7 @@ def test_operation_without_a_c_form(tmp_path, monkeypatch):
 
 
 def test_constant_that_no_float_holds(tmp_path, monkeypatch):
-    law = LAWS["attitude_pd"]
+    law = REGISTRY.find("attitude_pd")
     command = law.command
     monkeypatch.setattr(law, "command", lambda self, t, y, m: 1e-200 * command(self, t, y, m))
     with pytest.raises(PrinterError, match="1e-200 does not fit a float"):

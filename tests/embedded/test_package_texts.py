@@ -13,7 +13,6 @@ import pytest
 from markdown_it import MarkdownIt
 
 import casadi_gnc
-from casadi_gnc.delivery.describing import describe
 from casadi_gnc.delivery.fmu import generate_fmu
 from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.embedded import fmu, package
@@ -22,6 +21,7 @@ from casadi_gnc.embedded.readme import render_readme
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import flight_source
+from casadi_gnc.missions.onboard import describe
 from casadi_gnc.signals import Layout
 from casadi_gnc.system import assets
 

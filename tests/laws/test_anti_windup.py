@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from casadi_gnc.laws import LAWS, Detumble, PerformanceFunnel, PrescribedPerformance
+from casadi_gnc.laws import REGISTRY, Detumble, PerformanceFunnel, PrescribedPerformance
 from casadi_gnc.mechanics.rigid_body import RigidBody
 
 BODY = RigidBody(ca.DM(np.diag([0.5, 1.2, 1.3])))
@@ -27,9 +27,9 @@ def test_corrected_sign_is_stable_and_printed_sign_runs_away(name):
         ca.DM([1.0] * 3), ca.DM([1e-3] * 3), ca.DM([0.1] * 3), ca.DM([1.0] * 3), ca.DM([1.0] * 3)
     )
     extra = {"funnel": funnel, "attitude_gain": 0.1, "filter_time_constant": 1.0} if name != "detumble" else {}
-    law = LAWS[name](body=BODY, **GAINS, **extra)
+    law = REGISTRY.find(name)(body=BODY, **GAINS, **extra)
     assert isinstance(law, (Detumble, PrescribedPerformance))
     # zeta' = -k4 zeta + u - u_c0 with u_c0 = ... +- k3 zeta: the rate is -k4 -+ k3.
     assert saturated_slope(law) == pytest.approx(-1.5)
-    printed = LAWS[name](body=BODY, printed=frozenset({"anti_windup_sign"}), **GAINS, **extra)
+    printed = REGISTRY.find(name)(body=BODY, printed=frozenset({"anti_windup_sign"}), **GAINS, **extra)
     assert saturated_slope(printed) == pytest.approx(+0.5)

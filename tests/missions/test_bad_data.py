@@ -108,9 +108,9 @@ def test_rate_limit_is_kept_step_by_step(detumble):
 
 
 def test_true_centre_of_mass_changes_the_truth_only(tmp_path):
-    from casadi_gnc.problem_files.loading import read
+    from casadi_gnc.problem_files.document import read
 
-    _, text, _ = read("huang2020/detumble")
+    text = read("huang2020/detumble").text
     path = tmp_path / "moved.toml"
     path.write_text(
         text.replace("inertia_factor = 1.1", "inertia_factor = 1.1\ncentre_of_mass_error_m = [5e-3, 0.0, 0.0]")

@@ -18,11 +18,13 @@ from casadi_gnc.checking import authority, check, funnels, geometry, noise, samp
 from casadi_gnc.checking.linear import LinearLoop, spectral_radius
 from casadi_gnc.checks import Check, worst
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.missions.mission import Actuation, Funnel, Mission, Scheme, Timing
+from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.plant import Plant
-from casadi_gnc.problem_files.building import build
-from casadi_gnc.problem_files.loading import check as validate
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.missions.scheme import Funnel, Scheme
+from casadi_gnc.missions.timing import Timing
+from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load_document
 from casadi_gnc.signals import Layout, Signal
 
 TURNED = ca.DM([[1.0, -1.0], [1.0, 1.0]]) / 2**0.5
@@ -315,12 +317,13 @@ def test_inertias_and_rotations():
 def test_wheels_store_what_pushes_for_long():
     """A torque of 0.01 N m about an axis of three orthogonal wheels of 0.338 kg m^2 for 120 s: 3.55 rad/s."""
     axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    path, text, data = read("huang2019/free_axes")
+    document = read("huang2019/free_axes")
+    data = document.data
     data["spacecraft"] |= {"wheels": {**data["spacecraft"]["wheels"], "axes": axes}}
     data["spacecraft"].pop("rotation_321_rad")
     data.pop("fault")
     data["environment"] = {"constant_torque_N_m": [0.01, 0.0, 0.0]}
-    found = only(check(build(validate(data, path, text), path, text), "pd_pinv"), "authority.wheel_speed")
+    found = only(check(load_document(document), "pd_pinv"), "authority.wheel_speed")
     assert found.value == pytest.approx(0.01 * 120 / 0.338, rel=1e-6)
 
 
@@ -379,7 +382,7 @@ def test_command_keeps_names_and_numbers_whole_in_80_columns():
 
 def test_command_says_what_a_law_refuses(tmp_path):
     """Shi et al.'s baseline at 10 Hz: its gain of 2519 N s/m bears 2 x 28.57/2519.5 = 22.7 ms at most."""
-    _, text, _ = read("shi2020/docking_as_printed")
+    text = read("shi2020/docking_as_printed").text
     path = tmp_path / "slow.toml"
     path.write_text(
         re.sub(r'mode = "continuous"\nsample_period_s = \S+', 'mode = "sampled"\nsample_period_s = 0.1', text)

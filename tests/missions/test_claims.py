@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.problem_files.building import build
-from casadi_gnc.problem_files.loading import check, read
+from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load_document
 from casadi_gnc.status import StepStatus
 
 
@@ -57,10 +57,11 @@ def test_observer_told_of_the_achieved_torque_does_not_settle(detumble):
 
 def test_robust_allocation_against_five_centimetres():
     """Printed 800 s; saturated tumbling is sensitive, so 780 .. 825 s and no tighter."""
-    path, text, data = read("huang2020/detumble")
+    document = read("huang2020/detumble")
+    data = document.data
     data["scheme"] = [scheme for scheme in data["scheme"] if scheme["name"] == "observer_robust"]
     data["scheme"][0]["allocation"]["centre_of_mass_error_m"] = [0.05, 0.05, 0.05]
-    flight = casadi_gnc.fly(build(check(data, path, text), path, text))
+    flight = casadi_gnc.fly(load_document(document))
     assert 780 <= flight.metrics["settling_time"] <= 825
     assert flight.metrics["steady_rate"] < 5e-6
     assert flight.metrics["torque_sample_sum"] == pytest.approx(15.34, rel=0.02)

@@ -7,8 +7,8 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import LawError, ProblemError
-from casadi_gnc.problem_files.building import build
-from casadi_gnc.problem_files.loading import check, read
+from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load_document
 from casadi_gnc.status import StepStatus
 
 #: Where a printed number was reproduced, it is to be met this closely.
@@ -17,9 +17,10 @@ CLOSE = 0.02
 
 def loaded(change, problem="shi2020/docking_as_printed") -> casadi_gnc.Mission:
     """Return a shipped mission with some keys of its file changed."""
-    path, text, data = read(problem)
+    document = read(problem)
+    data = document.data
     change(data)
-    return build(check(data, path, text), path, text)
+    return load_document(document)
 
 
 def printed() -> casadi_gnc.Mission:
@@ -266,7 +267,7 @@ class TestDefault:
             data["spacecraft"].update(coil_radius_m=0.3)
 
         mission = loaded(change, "shi2020/docking")
-        assert "nearer than 2.4 m" in mission.notes[0]
+        assert "nearer than 2.4 m" in mission.craft.notes()[0]
         flight = casadi_gnc.fly(mission, "iobc")
         first = flight.statuses[StepStatus.NEAR_FIELD][1]
         assert flight["distance"][flight.time < first].min() > 2.39

@@ -13,8 +13,11 @@ import pytest
 import casadi_gnc
 from casadi_gnc.allocation import Direct
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.missions.mission import Actuation, Funnel, Metric, Mission, Noise, Scheme, Timing
+from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.plant import Plant
+from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
+from casadi_gnc.missions.timing import Noise, Timing
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 

@@ -1,6 +1,5 @@
 """The numbers of Sun and Zheng (2018) as computed independently, and an oracle written by hand."""
 
-import copy
 import re
 
 import casadi as ca
@@ -11,16 +10,17 @@ import pytest
 import casadi_gnc
 from casadi_gnc import checking
 from casadi_gnc.mathematics.noise import normals, uniform_count, uniforms
-from casadi_gnc.problem_files.building import build
-from casadi_gnc.problem_files.loading import check, read
+from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load_document
 from casadi_gnc.status import StepStatus
 
 
 def changed(problem: str, change) -> casadi_gnc.Mission:
     """Return a shipped mission whose data `change` edits."""
-    path, text, data = read(f"sun2018/{problem}")
-    change(data := copy.deepcopy(data))
-    return build(check(data, path, text), path, text)
+    document = read(f"sun2018/{problem}")
+    data = document.data
+    change(data)
+    return load_document(document)
 
 
 def sizes(flight: casadi_gnc.Flight, name: str) -> np.ndarray:

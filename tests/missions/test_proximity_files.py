@@ -6,9 +6,9 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import ProblemError
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
-_, GOOD, _ = read("sun2018/circular_orbit")
+GOOD = read("sun2018/circular_orbit").text
 J = "inertia_kg_m2 = [[598.3, -22.5, -51.5]"
 RADIUS = "keep_out_radius_m = 4.0"
 CASES = {
@@ -22,7 +22,7 @@ CASES = {
     "point inside": (
         RADIUS,
         "keep_out_radius_m = 6.0",
-        "spacecraft: hold_point_m is 5 m from the target's centre, inside the keep-out sphere of 6 m; move",
+        "spacecraft.hold_point_m: hold_point_m is 5 m from the target's centre, inside the keep-out sphere of 6 m",
     ),
     "point on the sphere": (RADIUS, "keep_out_radius_m = 5.0", "inside the keep-out sphere of 5 m"),
     "negative radius": (
@@ -97,7 +97,7 @@ def notes(factor: float) -> tuple[str, ...]:
     """Return the notes with the chaser's velocity scaled, where the orbit need not be circular."""
     velocity = [factor * v for v in casadi_gnc.load("sun2018/circular_orbit").start[15:18]]
     changes = {"orbit.circular": False, "initial.velocity_m_per_s": velocity}
-    return casadi_gnc.load("sun2018/circular_orbit", changes).notes
+    return casadi_gnc.load("sun2018/circular_orbit", changes).craft.notes()
 
 
 def test_orbits_that_are_none_are_told_unless_they_must_be_circular():

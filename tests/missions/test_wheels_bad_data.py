@@ -7,10 +7,10 @@ import sys
 import pytest
 
 import casadi_gnc
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
-_, NOMINAL, _ = read("huang2019/nominal")
-_, FREE, _ = read("huang2019/free_axes")
+NOMINAL = read("huang2019/nominal").text
+FREE = read("huang2019/free_axes").text
 CASES = {
     "axis": (NOMINAL, "index = 3", "index = 4", "line \\d+, fault\\[4\\]: fault of axis 4, but there are 1 to 3"),
     "wheel": (FREE, "index = 3", "index = 5", "fault\\[4\\]: fault of wheel 5, but there are 1 to 4"),
@@ -93,8 +93,8 @@ CASES = {
     "law": (
         NOMINAL,
         'type = "two_observer_attitude"',
-        'type = "prescribed_performance"',
-        "unknown type 'prescribed_performance'; known: attitude_pd",
+        'type = "prescribed_pefrormance"',
+        "no law 'prescribed_pefrormance'; did you mean 'prescribed_performance'",
     ),
     "gain": (
         NOMINAL,

@@ -8,12 +8,12 @@ import numpy as np
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.mechanics.attitude import frame_rotation
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry, corner_errors
-from casadi_gnc.problem_files.loading import read
+from casadi_gnc.problem_files.document import read
 
 MAX_FORCE = 3.75e-3  # N, Table 2
 COMMAND = np.array([4e-4, -3e-4, 2e-4])  # N m, about what the thrusters can make
 ROTATION = frame_rotation(np.pi / 4, np.pi / 7, np.pi / 3)
-_mounted = read("huang2020/detumble")[2]["spacecraft"]["thrusters"]
+_mounted = read("huang2020/detumble").data["spacecraft"]["thrusters"]
 GEOMETRY = ThrusterGeometry.from_rows(_mounted["positions_m"], _mounted["directions"]).seen_from(ROTATION, [0.05] * 3)
 
 

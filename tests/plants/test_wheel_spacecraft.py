@@ -21,10 +21,9 @@ START = np.array([0.3, -0.2, 0.4, 0.05, -0.08, 0.06, 90.0, -60.0, 40.0, 20.0])
 HARMONIC = Harmonics((0.01, -0.02, 0.0), (0.3, 0.2), ((0.05, 0, 0.01), (0.0, 0.03, 0)), (np.pi / 2, 0.0))
 
 
-def craft(orbit_rate=0.0, **changes) -> WheelSpacecraft:
-    return WheelSpacecraft(
-        wheels.Gyrostat(ca.DM(J), orbit_rate=orbit_rate, wheels=wheels.WheelArray(ca.DM(C), JW)), **changes
-    )
+def craft(orbit_rate=0.0, max_speed=np.inf, **changes) -> WheelSpacecraft:
+    array = wheels.WheelArray(ca.DM(C), JW, max_speed=max_speed)
+    return WheelSpacecraft(wheels.Gyrostat(ca.DM(J), orbit_rate=orbit_rate, wheels=array), **changes)
 
 
 def command(t):

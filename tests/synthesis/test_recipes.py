@@ -119,7 +119,7 @@ def test_intermediate_observer_sampled():
 
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_theorem_1_as_printed_is_infeasible(backend):
-    answer = theorem1(**load_synthesis("shi2020/as_printed").arguments, backend=backend)
+    answer = theorem1(**load_synthesis("shi2020/as_printed").recipe.arguments(), backend=backend)
     assert answer.status is LmiStatus.INFEASIBLE
     assert answer.conflict == ("(26) input",)
     assert next(iter(answer.infeasibility.shares)) == "(26) input"
@@ -128,7 +128,7 @@ def test_theorem_1_as_printed_is_infeasible(backend):
 
 def one_axis(k0, **others):
     """Return Theorem 1 for one axis, with a given k0 = limit^2/(alpha + 1)."""
-    data, alpha = load_synthesis("shi2020/as_printed").arguments, 7999 / 3
+    data, alpha = load_synthesis("shi2020/as_printed").recipe.arguments(), 7999 / 3
     M0 = data["M0"][::3, ::3]
     given = {name: data[name] for name in ("varpi", "start", "kappa3")}
     return theorem1(A, B, np.eye(2), M0, alpha=alpha, limit=np.sqrt(k0 * (alpha + 1)), **given, **others)

@@ -5,17 +5,18 @@ import dataclasses
 import casadi as ca
 import numpy as np
 import pytest
+from other_truths import with_plant
 from packages import copied, made, need_target
 
 import casadi_gnc
 from casadi_gnc.allocation.in_flight import Direct
-from casadi_gnc.delivery.describing import describe
-from casadi_gnc.delivery.packaging import read_vectors
 from casadi_gnc.delivery.vectors import fly_package
+from casadi_gnc.delivery.verifying import read_vectors
 from casadi_gnc.embedded import package, targets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.errors import TargetError
+from casadi_gnc.missions.onboard import describe
 
 #: One mission of each paper, by the scheme that is its own.
 MISSIONS = [
@@ -76,7 +77,7 @@ def without_allocation(real: str, folder, steps: int = 300):
         told, effectiveness=ca.DM.eye(3), lower=told.limit_below, upper=told.limit_above, allocator=Direct()
     )
     mission = mission.with_scheme("funnel_pinv", actuation=direct)
-    mission = dataclasses.replace(mission, truth=dataclasses.replace(mission.truth, effectiveness=ca.DM.eye(3)))
+    mission = with_plant(mission, dataclasses.replace(mission.truth, effectiveness=ca.DM.eye(3)))
     controller, options = describe(mission), Options("slew", real)
     header = package.replay_header(controller, options, steps)
     package.put(folder, {**package.flight_files(controller, options), "test/replay.h": header})

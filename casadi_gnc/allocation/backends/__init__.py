@@ -23,6 +23,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.registry import Registry
 
 
 class Capability(Flag):
@@ -80,47 +81,58 @@ class BackEnd:
     set_up: Callable[..., Solver]
 
 
-#: Module of each back end, or module:object, by the name that users give.
-_HOMES = {
-    "online": "online_",
-    "clarabel": "clarabel_",
-    "scs": "scs_",
-    "sdp": "sdp_",
-    "sdp_scs": "sdp_:SCS",
-    "ipopt": "nlp_",
-    "sqpmethod": "nlp_:SQPMETHOD",
-    "sqpmethod_qrqp": "nlp_:SQPMETHOD_QRQP",
-    "proxqp": "proxqp_",
-    "daqp": "daqp_",
-    "osqp": "qpsolvers_:OSQP",
-    "highs": "qpsolvers_:HIGHS",
-    "piqp": "qpsolvers_:PIQP",
-    "pinv": "pinv_",
-}
 #: Before the name of any solver that qpsolvers finds, whatever its licence.
 QPSOLVERS = "qpsolvers:"
+_PARTS = ("CAPABILITIES", "REQUIRES", "ACCURACY", "set_up")
+
+#: Back ends by the name that users give: shipped ones, those of installed packages, a user's own.
+REGISTRY = Registry(
+    "allocation back end",
+    "casadi_gnc.allocation_backends",
+    {
+        name: f"{__name__}.{home}"
+        for name, home in {
+            "online": "online_",
+            "clarabel": "clarabel_",
+            "scs": "scs_",
+            "sdp": "sdp_",
+            "sdp_scs": "sdp_:SCS",
+            "ipopt": "nlp_",
+            "sqpmethod": "nlp_:SQPMETHOD",
+            "sqpmethod_qrqp": "nlp_:SQPMETHOD_QRQP",
+            "proxqp": "proxqp_",
+            "daqp": "daqp_",
+            "osqp": "qpsolvers_:OSQP",
+            "highs": "qpsolvers_:HIGHS",
+            "piqp": "qpsolvers_:PIQP",
+            "pinv": "pinv_",
+        }.items()
+    },
+    is_one=lambda thing: all(hasattr(thing, part) for part in _PARTS),
+    expected=f"a casadi_gnc.allocation.backends.BackEnd, or a module with {', '.join(_PARTS)}",
+    more=f", and {QPSOLVERS}NAME for any solver that qpsolvers finds",
+    error=AllocationError,
+)
 
 
 def names() -> list[str]:
     """Return the names of all back ends, installed or not."""
-    return list(_HOMES)
+    return REGISTRY.names()
 
 
-def module(name: str) -> Any:
-    """Return a back end (its module or `BackEnd`); raise `AllocationError` naming what there is."""
-    if name.startswith(QPSOLVERS):
+def module(name: Any) -> Any:
+    """Return a back end (its module or `BackEnd`) by its name; raise `AllocationError` naming what there is."""
+    if isinstance(name, str) and name.startswith(QPSOLVERS):
         return import_module(f"{__name__}.qpsolvers_").back_end(name.removeprefix(QPSOLVERS))
-    if name not in _HOMES:
-        raise AllocationError(
-            f"no allocation back end {name!r}; there is {', '.join(names())}, "
-            f"and {QPSOLVERS}NAME for any solver that qpsolvers finds"
-        )
-    home, _, attribute = _HOMES[name].partition(":")
-    found = import_module(f"{__name__}.{home}")
-    return getattr(found, attribute) if attribute else found
+    return REGISTRY.find(name)
 
 
-def missing(name: str) -> list[str]:
+def name_of(name: Any) -> str:
+    """Return the name of a back end that is given by it, or as an object."""
+    return name if isinstance(name, str) else REGISTRY.name_of(name)
+
+
+def missing(name: Any) -> list[str]:
     """Return the packages that a back end needs and that are not installed."""
     return [package for package in module(name).REQUIRES if util.find_spec(package) is None]
 

@@ -44,7 +44,7 @@ def _printed() -> dict[str, Any]:
 @cache
 def _data() -> dict[str, Any]:
     """Return what (24) to (26) are given."""
-    given = load_synthesis("shi2020/as_printed").arguments
+    given = load_synthesis("shi2020/as_printed").recipe.arguments()
     return {name: value for name, value in given.items() if name not in ("price", "margin")}
 
 

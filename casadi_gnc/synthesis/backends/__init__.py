@@ -13,12 +13,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from importlib import import_module, util
+from importlib import util
 from typing import Any, Protocol
 
 import numpy as np
 
 from casadi_gnc.errors import SynthesisError
+from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis.scaling import Scaled
 
 
@@ -61,19 +62,25 @@ class BackEnd(Protocol):
         ...
 
 
-_HOMES = {"clarabel": "clarabel_", "scs": "scs_", "barrier": "barrier_"}
+#: Back ends by name: shipped ones, those of installed packages, a user's own.
+REGISTRY = Registry(
+    "LMI back end",
+    "casadi_gnc.synthesis_backends",
+    {name: f"{__name__}.{name}_" for name in ("clarabel", "scs", "barrier")},
+    is_one=lambda thing: hasattr(thing, "REQUIRES") and hasattr(thing, "solve"),
+    expected="an object or module with REQUIRES and solve",
+    error=SynthesisError,
+)
 
 
 def names() -> list[str]:
     """Return the names of all back ends, installed or not."""
-    return list(_HOMES)
+    return REGISTRY.names()
 
 
-def module(name: str) -> Any:
+def module(name: Any) -> Any:
     """Return a back end; raise `SynthesisError` naming what there is, or what is not installed."""
-    if name not in _HOMES:
-        raise SynthesisError(f"no LMI back end {name!r}; there is {', '.join(names())}")
-    found = import_module(f"{__name__}.{_HOMES[name]}")
+    found = REGISTRY.find(name)
     lacking = [package for package in found.REQUIRES if util.find_spec(package) is None]
     if lacking:
         raise SynthesisError(

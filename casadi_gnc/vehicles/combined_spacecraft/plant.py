@@ -19,7 +19,7 @@ Source: Huang, Biggs, Duan (2020), section 2, doi:10.1016/j.ast.2019.105572.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -53,19 +53,22 @@ class CombinedSpacecraft(Plant):
     @property
     def state(self) -> Layout:
         """Mrp and rate."""
-        return Layout((Signal("mrp", 3, "-", FRAME), Signal("rate", 3, "rad/s", FRAME)))
+        return Layout((Signal("mrp", 3, "-", FRAME, kind="mrp"), Signal("rate", 3, "rad/s", FRAME, kind="rate")))
 
     @property
     def measurement(self) -> Layout:
         """Mrp and rate, each with the largest magnitude that can be true."""
-        return Layout(
-            (Signal("mrp", 3, "-", FRAME, limit=2.0), Signal("rate", 3, "rad/s", FRAME, limit=self.rate_limit))
-        )
+        mrp, rate = self.state.signals
+        return Layout((replace(mrp, limit=2.0), replace(rate, limit=self.rate_limit)))
 
     @property
     def inputs(self) -> Layout:
         """Thruster forces."""
         return Layout((Signal("force", self.effectiveness.shape[1], "N"),))
+
+    def inertias(self) -> dict[str, Any]:
+        """Return the true inertia."""
+        return {"true": self.body.inertia}
 
     def torque(self, force: Any) -> Any:
         """Return the torque that the thrusters really make, A_c F, (3,), [N m]."""

@@ -7,159 +7,98 @@ Tables of the file: [spacecraft], the satellite; [orbit] of the test mass; [beli
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal, cast
+from typing import ClassVar, cast
 
 import casadi as ca
-import numpy as np
-from pydantic import Field, field_validator
+from pydantic import Field
 
-from casadi_gnc.allocation.in_flight import Direct
+from casadi_gnc.checking import manoeuvre
 from casadi_gnc.checks import Check
 from casadi_gnc.laws.drag_free import DragFree
 from casadi_gnc.laws.drag_free_motions import Satellite
-from casadi_gnc.mechanics.circular_orbit import EARTH_MU, EARTH_RADIUS, CircularOrbit
+from casadi_gnc.mechanics.circular_orbit import CircularOrbit
 from casadi_gnc.mechanics.rigid_body import RigidBody
-from casadi_gnc.missions.mission import Actuation, Mission, Panel
-from casadi_gnc.missions.mission import Scheme as MissionScheme
-from casadi_gnc.problem_files.schema import Matrix, MissionModel, Part, Positive, SchemeModel, Vector, law_tables
+from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
-from casadi_gnc.tables.orbital_environment import Environment
-from casadi_gnc.vehicles import Craft, Where
+from casadi_gnc.tables.disturbances import OrbitalPush
+from casadi_gnc.tables.limits import ForceAndTorqueLimits
+from casadi_gnc.tables.part import Part, Positive, table
 from casadi_gnc.vehicles.drag_free_pair.plant import DragFreePair
+from casadi_gnc.vehicles.drag_free_pair.tables import Believed, Initial, Orbit
+
+_KEYS = {"mrp": "mrp", "rate": "rate_rad_per_s", "position": "position_m", "velocity": "velocity_m_per_s"}
 
 
-class Spacecraft(Part):
+class DragFreePairCraft(Craft):
     """The satellite as it is, and the largest measurements of each axis that can be true."""
 
-    model: Literal["drag_free_pair"]
+    scheme_keys: ClassVar[type[Part]] = ForceAndTorqueLimits
+    example: ClassVar[str | None] = "tao2019/case1"
+
     mass_kg: Positive
-    inertia_kg_m2: Matrix = Field(description="about the centre of mass, satellite frame")
+    inertia_kg_m2: matrices.Inertia = Field(description="about the centre of mass, satellite frame")
     rate_limit_rad_per_s: Positive = 10.0
     position_limit_m: Positive = 10.0
     velocity_limit_m_per_s: Positive = 10.0
+    orbit: Orbit = table()
+    believed: Believed = table()
+    environment: OrbitalPush = table(OrbitalPush())
+    initial: Initial = table()
 
-    _spd = field_validator("inertia_kg_m2")(matrices.check_inertia)
+    def _circular_orbit(self) -> CircularOrbit:
+        given = self.orbit
+        return CircularOrbit(given.body_radius_m + given.altitude_m, given.gravitational_parameter_m3_per_s2)
 
+    def plant(self) -> DragFreePair:
+        """Return the truth."""
+        return DragFreePair(
+            self.mass_kg,
+            RigidBody(ca.DM(self.inertia_kg_m2)),
+            self._circular_orbit(),
+            self.environment.disturbance(),
+            self.rate_limit_rad_per_s,
+            self.position_limit_m,
+            self.velocity_limit_m_per_s,
+        )
 
-class Orbit(Part):
-    """The circular orbit of the test mass, whose frame the orbiting frame is."""
+    def start(self) -> dict[str, list[float]]:
+        """Return the relative state at t = 0."""
+        return {signal: getattr(self.initial, key) for signal, key in _KEYS.items()}
 
-    altitude_m: Annotated[
-        float, Field(ge=1e5, description="above the radius of the body; below 100 km nothing falls freely")
-    ]
-    body_radius_m: Positive = EARTH_RADIUS
-    gravitational_parameter_m3_per_s2: Positive = EARTH_MU
+    def belief(self) -> Satellite:
+        """Return mass and inertia from which the estimates start, and the orbit."""
+        return Satellite(self.believed.mass_kg, ca.DM(self.believed.inertia_kg_m2), self._circular_orbit())
 
+    def actuation(self, keys: Part | None = None) -> Actuation:
+        """Return the actuation of a scheme: every axis is clipped by itself."""
+        return Actuation.direct(self.plant().inputs, cast(ForceAndTorqueLimits, keys).column())
 
-class Believed(Part):
-    """What the flight software believes of the satellite, and where its estimates start."""
+    def regulated(self, mission: Mission) -> dict[str, list[float]]:
+        """Return the relative state at zero."""
+        return {name: [0.0] * 3 for name in mission.truth.state.names}
 
-    mass_kg: Positive
-    inertia_kg_m2: Matrix
-
-    _spd = field_validator("inertia_kg_m2")(matrices.check_inertia)
-
-
-class Initial(Part):
-    """State at t = 0 relative to the test mass, resolved in the satellite's frame."""
-
-    mrp: Vector = Field(description="sigma_e, test-mass frame -> satellite frame; shorter than 1")
-    rate_rad_per_s: Vector = Field(description="omega_e")
-    position_m: Vector = Field(description="r_e, of the satellite from the test mass")
-    velocity_m_per_s: Vector = Field(description="v_e, difference of the inertial velocities")
-
-    @field_validator("mrp")
-    @classmethod
-    def _is_the_short_turn(cls, value: list[float]) -> list[float]:
-        length = float(np.linalg.norm(value))
-        if length >= 1:
-            raise ValueError(
-                f"the MRPs have the length {length:.4g}; expected less than 1, half a turn: in a funnel they cannot "
-                "change to the other set. Give the same attitude as minus the vector over its square"
-            )
-        return value
-
-
-_Laws = law_tables("drag_free")
-Limits = Annotated[list[Positive], Field(min_length=3, max_length=3)]
-
-
-class Scheme(SchemeModel):
-    """A scheme of this craft: every axis is clipped by itself."""
-
-    force_limit_N: Limits
-    torque_limit_N_m: Limits
-    law: _Laws  # type: ignore[valid-type]
-
-
-class MissionFile(MissionModel):
-    """A mission of satellite and test mass."""
-
-    spacecraft: Spacecraft
-    orbit: Orbit
-    believed: Believed
-    environment: Environment = Environment()
-    initial: Initial
-    scheme: Annotated[list[Scheme], Field(min_length=1)]
-
-
-def build(model: MissionFile, where: Where) -> Craft:
-    """Return the craft that a file describes."""
-    craft, believed, initial = model.spacecraft, model.believed, model.initial
-    orbit = CircularOrbit(
-        model.orbit.body_radius_m + model.orbit.altitude_m, model.orbit.gravitational_parameter_m3_per_s2
-    )
-    plant = DragFreePair(
-        craft.mass_kg,
-        RigidBody(ca.DM(craft.inertia_kg_m2)),
-        orbit,
-        model.environment.disturbance(),
-        craft.rate_limit_rad_per_s,
-        craft.position_limit_m,
-        craft.velocity_limit_m_per_s,
-    )
-    keys = {
-        "mrp": "mrp",
-        "rate": "rate_rad_per_s",
-        "position": "position_m",
-        "velocity": "velocity_m_per_s",
-    }
-    return Craft(
-        plant=plant,
-        start=[number for name in plant.state.names for number in getattr(initial, keys[name])],
-        start_keys=keys,
-        believed=Satellite(believed.mass_kg, ca.DM(believed.inertia_kg_m2), orbit),
-        actuation=lambda scheme: _actuation(scheme, plant),
-        panels=(
+    def panels(self, mission: Mission) -> tuple[Panel, ...]:
+        """Return position, attitude, efforts."""
+        return (
             Panel("tracked", "position", "relative position"),
             Panel("tracked", "mrp", "relative attitude MRPs"),
             Panel("effort", "force", "force"),
             Panel("effort", "torque", "torque"),
-        ),
-        target={name: [0.0] * 3 for name in plant.state.names},
-        checks=_checks,
-    )
+        )
 
+    def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
+        """Yield whether the law's own handling of saturation lets it keep its funnels."""
+        law = scheme.law
+        if not isinstance(law, DragFree):
+            return
+        for signal, handling in (("mrp", law.torque_saturation), ("position", law.force_saturation)):
+            if law.keeps(signal) and handling == "auxiliary":
+                yield from manoeuvre.auxiliary(mission, scheme, signal)
 
-def _checks(mission: Mission, scheme: MissionScheme) -> Iterator[Check]:
-    """Yield whether the law's own handling of saturation lets it keep its funnels."""
-    from casadi_gnc.checking import manoeuvre
-
-    law = cast(DragFree, scheme.law)
-    for signal, handling in (("mrp", law.torque_saturation), ("position", law.force_saturation)):
-        if law.keeps(signal) and handling == "auxiliary":
-            yield from manoeuvre.auxiliary(mission, scheme, signal)
-
-
-def _actuation(scheme: Scheme, plant: DragFreePair) -> Actuation:
-    limits = [*scheme.force_limit_N, *scheme.torque_limit_N_m]
-    return Actuation(
-        effectiveness=ca.DM.eye(6),
-        lower=[-limit for limit in limits],
-        upper=limits,
-        rate=float("inf"),
-        limit_below=[-limit for limit in limits],
-        limit_above=limits,
-        allocator=Direct(),
-        effort=plant.inputs,
-    )
+    def key_of(self, signal: str) -> tuple[str, ...]:
+        """Return the key of [initial]."""
+        return ("initial", _KEYS[signal])

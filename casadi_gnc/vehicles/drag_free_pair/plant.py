@@ -73,8 +73,8 @@ class DragFreePair(Plant):
         """Attitude, rate, position and velocity, each with the largest magnitude that can be true."""
         return Layout(
             (
-                Signal("mrp", 3, "-", FRAME, limit=2.0),
-                Signal("rate", 3, "rad/s", FRAME, limit=self.rate_limit),
+                Signal("mrp", 3, "-", FRAME, limit=2.0, kind="mrp"),
+                Signal("rate", 3, "rad/s", FRAME, limit=self.rate_limit, kind="rate"),
                 Signal("position", 3, "m", FRAME, limit=self.position_limit),
                 Signal("velocity", 3, "m/s", FRAME, limit=self.velocity_limit),
             )
@@ -89,6 +89,10 @@ class DragFreePair(Plant):
     def measurement(self) -> Layout:
         """All of the state."""
         return self.state
+
+    def inertias(self) -> dict[str, Any]:
+        """Return the true inertia."""
+        return {"true": self.body.inertia}
 
     def rate(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
         """Return x' (eqs 1, 4, 8 and 9)."""

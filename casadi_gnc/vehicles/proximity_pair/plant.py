@@ -70,14 +70,15 @@ class RelativeSensor:
 RELATIVE = Layout(
     (
         Signal("position_error", 3, "m", FRAME, limit=1e7),
-        Signal("attitude_error", 3, "-", FRAME, limit=1e4),
+        Signal("attitude_error", 3, "-", FRAME, limit=1e4, kind="mrp"),
         Signal("velocity_error", 3, "m/s", FRAME, limit=1e5),
         Signal("rate_error", 3, "rad/s", FRAME, limit=20.0),
     )
 )
 #: What the chaser's actuators make.
 EFFORT = Layout((Signal("force", 3, "N", FRAME), Signal("torque", 3, "N m", FRAME)))
-_POSITION, _RATE = Signal("position", 3, "m", FRAME, limit=1e11), Signal("rate", 3, "rad/s", FRAME, limit=20.0)
+_POSITION = Signal("position", 3, "m", FRAME, limit=1e11)
+_RATE = Signal("rate", 3, "rad/s", FRAME, limit=20.0, kind="rate")
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +126,10 @@ class ProximityPair(Plant):
         pushed = [Signal("disturbance", 6)] if any(self.disturbance.deviation) else []
         read = [Signal(name, 3) for name, deviation in self.sensor.deviations().items() if deviation]
         return Layout((*pushed, *read))
+
+    def inertias(self) -> dict[str, Any]:
+        """Return the inertias of chaser and target."""
+        return {"true": self.motion.inertia, "target": self.target_inertia}
 
     def measure(self, t: Any, x: Any, noise: Any) -> Any:
         """Return what the sensors say at time t [s], a column of `measurement`."""

@@ -31,7 +31,7 @@ Source: Huang and Duan (2019), doi:10.1109/ACCESS.2019.2949285.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -72,11 +72,10 @@ class WheelSpacecraft(Plant):
 
     Parameters
     ----------
-    body : true inertia, wheels and orbit rate.
+    body : true inertia, wheels and orbit rate; a wheel that has reached its largest speed stops accelerating.
     disturbance : d(t).
     axis_faults, wheel_faults : on the three torques, [N m], and on the N wheels, [rad/s^2].
     attitude_error, rate_error : of the sensors.
-    max_speed : [rad/s]; a wheel that has reached it stops accelerating.
     rate_limit : rate [rad/s] per axis beyond which a rate measurement cannot be true.
     """
 
@@ -86,7 +85,6 @@ class WheelSpacecraft(Plant):
     wheel_faults: FaultSchedule | None = None
     attitude_error: SensorError = SensorError()
     rate_error: SensorError = SensorError()
-    max_speed: float = math.inf
     rate_limit: float = 10.0
 
     @property
@@ -98,17 +96,21 @@ class WheelSpacecraft(Plant):
         """Mrp, rate and wheel speed."""
         return Layout(
             (
-                Signal("mrp", 3, "-", FRAME),
-                Signal("rate", 3, "rad/s", FRAME),
-                Signal("wheel_speed", self._count, "rad/s"),
+                Signal("mrp", 3, "-", FRAME, kind="mrp"),
+                Signal("rate", 3, "rad/s", FRAME, kind="rate"),
+                Signal("wheel_speed", self._count, "rad/s", kind="wheel_speed"),
             )
         )
 
     @property
     def measurement(self) -> Layout:
         """The state, each signal with the largest magnitude that can be true."""
-        limits = {"mrp": 2.0, "rate": self.rate_limit, "wheel_speed": min(1.1 * self.max_speed, CREDIBLE_SPEED)}
-        return Layout(tuple(Signal(s.name, s.size, s.unit, s.frame, limits[s.name]) for s in self.state.signals))
+        limits = {
+            "mrp": 2.0,
+            "rate": self.rate_limit,
+            "wheel_speed": min(1.1 * self.body.wheels.max_speed, CREDIBLE_SPEED),
+        }
+        return Layout(tuple(replace(signal, limit=limits[signal.name]) for signal in self.state.signals))
 
     @property
     def inputs(self) -> Layout:
@@ -127,6 +129,10 @@ class WheelSpacecraft(Plant):
         """The torque that the body really feels from the wheels, faults included."""
         return Layout((Signal("true_torque", 3, "N m", FRAME),))
 
+    def inertias(self) -> dict[str, Any]:
+        """Return the true inertia."""
+        return {"true": self.body.inertia}
+
     def measure(self, t: Any, x: Any, noise: Any) -> Any:
         """Return what the sensors say; wheel speeds are told exactly."""
         if not self.noise.size:
@@ -141,9 +147,10 @@ class WheelSpacecraft(Plant):
     def acceleration(self, t: Any, speed: Any, command: Any) -> Any:
         """Return what the wheels make of a command, (N,), [rad/s^2]."""
         made = command if self.wheel_faults is None else self.wheel_faults.apply(t, command)
-        if self.max_speed == math.inf:
+        fastest = self.body.wheels.max_speed
+        if fastest == math.inf:
             return made
-        away = ca.logic_and(ca.fabs(speed) >= self.max_speed, made * speed > 0)
+        away = ca.logic_and(ca.fabs(speed) >= fastest, made * speed > 0)
         return ca.if_else(away, 0.0, made)
 
     def torque(self, t: Any, acceleration: Any) -> Any:

@@ -1,8 +1,8 @@
-"""Describe the controller of a mission's scheme, so that `casadi_gnc.embedded` can make C of it.
+"""What flies of a mission's scheme: a controller that `casadi_gnc.embedded` can make C of.
 
     before -> allocate -> judge -> after
 
-What flies is built from the same expressions as the tapes of a simulated flight. Gains named as
+These are slices of the loop (`casadi_gnc.missions.loop`) that a simulated flight is made of. Gains named as
 tunable become symbols; all that depends on them alone is taken out of the step (`extract_parametric`)
 and computed once, when they change.
 """
@@ -10,7 +10,7 @@ and computed once, when they change.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
@@ -18,10 +18,13 @@ import numpy as np
 from casadi_gnc.allocation import OnlineInFlight
 from casadi_gnc.embedded.controller import Controller, Tunable
 from casadi_gnc.errors import PackageError
-from casadi_gnc.laws import advance, gains_of
+from casadi_gnc.laws import gains_of
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.mission import Mission, Scheme
-from casadi_gnc.status import StepStatus
+from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.scheme import Scheme
+
+if TYPE_CHECKING:
+    from casadi_gnc.missions.mission import Mission
 
 #: Name of a tape -> its ports and its results.
 _Made = dict[str, tuple[dict[str, Any], dict[str, Any]]]
@@ -41,8 +44,7 @@ def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str]
     PackageError
         For a scheme whose allocation cannot fly, or a tunable that is no gain of the law.
     """
-    if mission.timing.mode != "sampled":
-        mission = mission.with_timing(mode="sampled")
+    mission = sampled(mission)
     chosen = mission.scheme(scheme)
     allocator = chosen.actuation.allocator
     if not chosen.actuation.is_symbolic and not isinstance(allocator, OnlineInFlight):
@@ -72,32 +74,11 @@ def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str]
         upper=tuple(float(value) for value in actuation.upper),
         least=tuple(float(value) for value in actuation.limit_below),
         most=tuple(float(value) for value in actuation.limit_above),
-        tapes=_tapes(mission, chosen, symbols),
-        statuses={
-            bit.value: (str(bit.name), bit.sentences[0]) for bit in StepStatus if bit in _raised(mission, chosen)
-        },
+        tapes=_tapes(Loop(mission, chosen), symbols),
+        statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in Loop(mission, chosen).raised()},
         tunables=tuple(parameters),
         allocation=allocator.problem if isinstance(allocator, OnlineInFlight) else None,
     )
-
-
-def _raised(mission: Mission, scheme: Scheme) -> set[StepStatus]:
-    """Return the bits that the controller can raise."""
-    s, actuation = tapes.Symbols(mission, scheme), scheme.actuation
-    bits = {
-        StepStatus.MEASUREMENT_REPLACED,
-        StepStatus.COMMAND_LIMITED,
-        StepStatus.COMMAND_REPLACED,
-        StepStatus.EFFORT_SHORT,
-        *scheme.law.status(s.t, tapes.law_inputs(mission, scheme, s.y), s.m),
-    }
-    if scheme.law.memory.size:
-        bits.add(StepStatus.MEMORY_RESET)
-    if actuation.judge is not None:
-        bits |= set(actuation.judge(mission.truth.measurement.split(s.y), s.limited, s.actuators))
-    if not actuation.is_symbolic:
-        bits |= {StepStatus.ALLOCATION_INEXACT, StepStatus.ALLOCATION_FAILED}
-    return bits
 
 
 def _parameter(scheme: Scheme, name: str) -> Tunable:
@@ -116,34 +97,35 @@ def _parameter(scheme: Scheme, name: str) -> Tunable:
     )
 
 
-def _tapes(mission: Mission, scheme: Scheme, parameters: list[ca.SX]) -> dict[str, ca.Function]:
+def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
     """Return the tapes of the controller.
 
     What allocate, judge and after need that does not depend on the new actuators is computed in
     `before`, where it shares subexpressions with the law, and carried over in a column.
     """
-    s, law = tapes.Symbols(mission, scheme), scheme.law
-    first = tapes.before(mission, scheme, s)
+    s = loop.symbols()
+    first = loop.before(s.t, s.y, s.good, s.m, s.actuators)
     y, limited = first["accepted"], first["limited"]
-    told = mission.truth.inputs.symbol("told")
-    achieved = tapes.achieved(mission, scheme, y, limited, told)
-    seen = tapes.law_inputs(mission, scheme, y)
-    memory = advance(law, s.t, seen, first["memory"], first["wanted"], achieved)
-    late = {"judge": {"verdict": tapes.judge(mission, scheme, y, limited, told)}, "after": {"memory": memory}}
-    inputs = {"t": s.t, "y": s.y, "good": s.good, "m": s.m, "actuators": s.actuators}
-    started = {"m": law.start(s.t, tapes.law_inputs(mission, scheme, s.y))}
+    told = loop.plant.inputs.symbol("told")
+    memory = loop.remembered(s.t, y, first["memory"], first["wanted"], limited, told)
+    late = {"judge": {"verdict": loop.judged(y, limited, told)}, "after": {"memory": memory}}
+    inputs = s.ports("t", "y", "good", "m", "actuators")
     now = {key: first[key] for key in ("accepted", "wanted", "limited", "lower", "upper", "flags")}
-    made: _Made = {"start": ({"t": s.t, "y": s.y}, started), "before": (inputs, now)}
-    if scheme.actuation.is_symbolic:
-        allocated = tapes.allocated(mission, scheme, y, s.limited, s.actuators, s.lower, s.upper)
-        ports = {"limited": s.limited, "actuators": s.actuators, "lower": s.lower, "upper": s.upper}
-        made["allocate"] = (ports, {"allocated": allocated})
+    made: _Made = {"start": (s.ports("t", "y"), {"m": loop.started(s.t, s.y)}), "before": (inputs, now)}
+    if loop.actuation.is_symbolic:
+        allocated = loop.allocated(y, s.limited, s.actuators, s.lower, s.upper)
+        made["allocate"] = (s.ports("limited", "actuators", "lower", "upper"), {"allocated": allocated})
     made |= {name: ({"told": told}, outputs) for name, outputs in late.items()}
     made, e, functions = _without_parameters(made, ca.vertcat(*parameters))
     made = _carried(made, ca.vertcat(*inputs.values(), *([e["e"]] if e else [])))
     for name, (ports, outputs) in made.items():
         functions[name] = tapes.function(name, {**ports, **e}, outputs)
     return functions
+
+
+def sampled(mission: Mission) -> Mission:
+    """Return the mission as it flies on board: sampled."""
+    return mission if mission.timing.mode == "sampled" else mission.with_timing(mode="sampled")
 
 
 def _all_of(made: _Made) -> list[ca.SX]:

@@ -1,0 +1,112 @@
+"""`casadi-gnc laws` and `casadi-gnc crafts`: what there is, and what fits what."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+_PROBLEM = typer.Argument(help="A mission file: what it names of your own is listed too.")
+_NAME = typer.Option("--show", help="Show this one only, in full.")
+_JSON = typer.Option("--json", help="Print as JSON, nothing else.")
+
+
+def laws(
+    problem: Annotated[str | None, _PROBLEM] = None,
+    show: Annotated[str | None, _NAME] = None,
+    json: Annotated[bool, _JSON] = False,
+) -> None:
+    """List the laws: gains with symbols and units, the crafts that each fits, and why it does not fit others."""
+    from casadi_gnc.problem_files import catalogue
+
+    samples = {craft.name: catalogue.sample_of(craft, problem) for craft in catalogue.crafts(problem)}
+    found = [catalogue.law_data(law, samples) for law in catalogue.laws(problem)]
+    found = _chosen(found, show, "law")
+    if json:
+        _print_json({"laws": found})
+        return
+    for law in found:
+        _heading(law)
+        typer.echo(f"  reads {', '.join(law['reads']) or 'what the craft gives'}; commands {_or(law['commands'])}"
+                   + (f"; models a {law['models']}" if law["models"] else ""))  # fmt: skip
+        _table(["gain", "symbol", "unit", "range", "default", "meaning"], [_gain(gain) for gain in law["gains"]])
+        typer.echo(f"  fits {', '.join(law['fits']) or 'no craft that is known'}")
+        for craft, why in law["does_not_fit"].items():
+            typer.echo(f"  not {craft}: {'; '.join(why)}")
+
+
+def crafts(
+    problem: Annotated[str | None, _PROBLEM] = None,
+    show: Annotated[str | None, _NAME] = None,
+    json: Annotated[bool, _JSON] = False,
+) -> None:
+    """List the crafts: what each measures and makes, the keys of its tables, and the laws that fit it."""
+    from casadi_gnc.problem_files import catalogue
+
+    known = catalogue.laws(problem)
+    found = []
+    for craft in catalogue.crafts(problem):
+        sample = catalogue.sample_of(craft, problem)
+        fitting = [law.name for law in known if catalogue.fits(law, sample) == []]
+        found.append(catalogue.craft_data(craft, sample, fitting))
+    found = _chosen(found, show, "craft")
+    if json:
+        _print_json({"crafts": found})
+        return
+    for craft in found:
+        _heading(craft)
+        typer.echo(f"  measures {_signals(craft['measures'])}")
+        typer.echo(f"  makes {_signals(craft['makes'])}; believes in {_or(craft['believes'])}")
+        typer.echo(f"  laws that fit: {', '.join(craft['laws']) or 'none that is known'}")
+        if craft["example"]:
+            typer.echo(f"  example: casadi-gnc problems copy {craft['example']} .")
+        rows = [
+            [key["table"], key["name"], "" if key["required"] else "optional", key["meaning"]] for key in craft["keys"]
+        ]
+        _table(["table", "key", "", "meaning"], rows)
+
+
+def _chosen(found: list[dict[str, Any]], name: str | None, kind: str) -> list[dict[str, Any]]:
+    from casadi_gnc.errors import RegistryError
+
+    if name is None:
+        return found
+    if name not in [one["name"] for one in found]:
+        raise RegistryError(f"no {kind} {name!r}; there is {', '.join(one['name'] for one in found)}")
+    return [one for one in found if one["name"] == name]
+
+
+def _heading(thing: dict[str, Any]) -> None:
+    typer.echo(f"\n{thing['name']}: {thing['about']}")
+
+
+def _gain(gain: dict[str, Any]) -> list[str]:
+    default = "" if gain["required"] else "none" if gain["default"] is None else str(gain["default"])
+    kind = " or ".join(map(str, gain["choices"])) or gain["range"]
+    size = "" if gain["size"] == 1 else f" ({gain['size']})"
+    return [f"{gain['name']}{size}", gain["symbol"], gain["unit"], kind, default, gain["meaning"]]
+
+
+def _or(value: Any) -> str:
+    return ", ".join(value) if isinstance(value, list) else value or "nothing of its own"
+
+
+def _signals(signals: list[dict[str, Any]] | None) -> str:
+    if signals is None:
+        return "what a mission says (give its file)"
+    return ", ".join(f"{s['name']} ({s['size']}) [{s['unit'] or '-'}]" for s in signals) or "nothing"
+
+
+def _table(columns: list[str], rows: list[list[str]]) -> None:
+    """Print rows under their columns; nothing is cut."""
+    if not rows:
+        return
+    widths = [max(len(row[i]) for row in [columns, *rows]) for i in range(len(columns))]
+    for row in [columns, *rows]:
+        typer.echo("    " + "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())
+
+
+def _print_json(content: dict[str, Any]) -> None:
+    import json
+
+    typer.echo(json.dumps(content, indent=2, default=str))

@@ -1,0 +1,133 @@
+"""What a craft's actuators can make, and how a scheme shares a wanted effort out among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import casadi as ca
+
+from casadi_gnc.allocation import Direct
+from casadi_gnc.errors import FlightError
+from casadi_gnc.laws.efforts import TORQUE
+from casadi_gnc.signals import Layout
+from casadi_gnc.status import StepStatus
+
+
+@dataclass(frozen=True, eq=False)
+class Actuators:
+    """Describe the actuators of a craft as the flight software believes them.
+
+    Functions given here are methods of the craft or of small classes, not lambdas, where a mission is to go to
+    another process.
+
+    Parameters
+    ----------
+    effectiveness : A, (R, N), effort per command, or a function of the measured signals (by name) that returns it.
+    lower, upper : (N,), amplitude bounds, unit of the actuators.
+    rate : largest change of an actuator per second, `inf` for none.
+    effort : what the actuators make together, one signal a kind; R rows.
+    reach : function of the measured signals and the sample period that returns further bounds, lower and upper,
+        (N,) each.
+    judge : function (measured signals, limited effort, actuators) -> flags by status bit, on board.
+    inverse : function (measured signals, limited effort) -> actuators, (N,), that a craft knows better than an
+        allocator could: the allocator is then given this in the place of the effort.
+    """
+
+    effectiveness: ca.DM | Callable[[Any], Any]
+    lower: Sequence[float]
+    upper: Sequence[float]
+    rate: float = float("inf")
+    effort: Layout = TORQUE
+    reach: Callable[[Any, float], tuple[Any, Any]] | None = None
+    judge: Callable[[Any, Any, Any], dict[StepStatus, Any]] | None = None
+    inverse: Callable[[Any, Any], Any] | None = None
+
+    def __post_init__(self) -> None:
+        if not callable(self.effectiveness):
+            matrix = ca.DM(self.effectiveness)
+            object.__setattr__(self, "effectiveness", matrix)
+            if matrix.shape != (self.effort.size, len(self.lower)):
+                raise FlightError(
+                    f"the effectiveness has shape {matrix.shape[0]} x {matrix.shape[1]}, expected {self.effort.size} "
+                    f"({', '.join(self.effort.names)}) x {len(self.lower)} (actuators)"
+                )
+        for name in ("lower", "upper"):
+            object.__setattr__(self, name, [float(value) for value in getattr(self, name)])
+        if len(self.lower) != len(self.upper):
+            raise FlightError(f"{len(self.lower)} lower bounds of actuators, but {len(self.upper)} upper ones")
+        crossed = [i for i, (low, high) in enumerate(zip(self.lower, self.upper, strict=True), 1) if not low <= high]
+        if crossed:
+            low, high = self.lower[crossed[0] - 1], self.upper[crossed[0] - 1]
+            raise FlightError(f"actuator {crossed[0]}: its lower bound {low:g} exceeds the upper, {high:g}")
+
+    def matrix(self, seen: Any) -> Any:
+        """Return the believed effectiveness, (R, N), at the measured signals `seen`."""
+        return self.effectiveness(seen) if callable(self.effectiveness) else self.effectiveness
+
+    def most(self) -> list[float]:
+        """Return the largest magnitude of each row of effort that the bounds allow, (R,); of a fixed effectiveness."""
+        if callable(self.effectiveness):
+            raise FlightError("the effectiveness follows the measurement, so no largest effort follows: give limits")
+        bound = ca.fmax(ca.fabs(ca.DM(self.lower)), ca.fabs(ca.DM(self.upper)))
+        return [float(value) for value in ca.mtimes(ca.fabs(self.effectiveness), bound).nonzeros()]
+
+
+@dataclass(frozen=True, eq=False)
+class Actuation(Actuators):
+    """Say how a wanted effort becomes actuator commands.
+
+    Parameters
+    ----------
+    limit_below, limit_above : (R,), box of the virtual control, units of `effort`.
+    allocator : an object with `report` and either `expression` (CasADi) or `start` (numpy), see
+        `casadi_gnc.allocation`.
+    """
+
+    limit_below: Sequence[float] = ()
+    limit_above: Sequence[float] = ()
+    allocator: Any = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("limit_below", "limit_above"):
+            object.__setattr__(self, name, [float(value) for value in getattr(self, name)])
+            if len(getattr(self, name)) != self.effort.size:
+                raise FlightError(
+                    f"{name} has {len(getattr(self, name))} numbers, expected {self.effort.size}, one for each row of "
+                    f"{', '.join(self.effort.names)}"
+                )
+        if not hasattr(self.allocator, "report") or not (self.is_symbolic or hasattr(self.allocator, "start")):
+            raise FlightError(
+                f"the allocator is an object of type {type(self.allocator).__name__}; expected one with `report` and "
+                "`expression` or `start`, such as casadi_gnc.allocation.PseudoInverse()"
+            )
+
+    @classmethod
+    def of(cls, actuators: Actuators, limit: Sequence[float], allocator: Any) -> Actuation:
+        """Return the actuation of some actuators, with limits of the same magnitude on both sides."""
+        own = {name: getattr(actuators, name) for name in Actuators.__dataclass_fields__}
+        return cls(**own, limit_below=[-value for value in limit], limit_above=list(limit), allocator=allocator)
+
+    @classmethod
+    def direct(cls, effort: Layout, limit: Sequence[float]) -> Actuation:
+        """Return an actuator for each row of effort that makes just that row, clipped to a limit of the same unit."""
+        most = list(limit)
+        own = Actuators(ca.DM.eye(effort.size), [-value for value in most], most, effort=effort)
+        return cls.of(own, most, Direct())
+
+    def named(self, stage: str) -> Layout:
+        """Return the signals of an effort at a stage: "wanted", "limited" or "achieved".
+
+        A craft with one kind of effort has them by the stage's name; one with several, by stage and kind.
+        """
+        alone = len(self.effort.signals) == 1
+        return Layout(
+            tuple(replace(each, name=stage if alone else f"{stage}_{each.name}") for each in self.effort.signals)
+        )
+
+    @property
+    def is_symbolic(self) -> bool:
+        """Whether the allocation is a CasADi expression, so that the whole loop is one."""
+        return hasattr(self.allocator, "expression")

@@ -1,0 +1,111 @@
+"""Do the parts of a mission fit each other? Each misfit is one sentence.
+
+A law fits a craft when the signals it reads are measured (name, size, unit, frame), what the software believes
+of the craft is of the kind that the law models, and the effort it commands is what the craft makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from casadi_gnc.errors import FlightError
+from casadi_gnc.laws import Law
+from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.scheme import Metric
+from casadi_gnc.signals import Layout, Signal
+
+if TYPE_CHECKING:
+    from casadi_gnc.missions.mission import Mission
+
+
+def misfits(law: type[Law], measured: Layout, believed: Any, effort: Layout) -> Iterator[str]:
+    """Yield why a law does not fit a craft: nothing where it does.
+
+    Parameters
+    ----------
+    law : its class.
+    measured : what the craft's sensors give.
+    believed : what its flight software believes of it.
+    effort : what its actuators make.
+    """
+    kind = law.belief_kind()
+    if kind is not None and not isinstance(believed, kind):
+        given = "nothing" if believed is None else f"a {type(believed).__name__}"
+        yield f"it models a {kind.__name__}, and the craft's software believes in {given}"
+        return
+    read = law.reads(believed).signals
+    absent = [signal.name for signal in read if signal.name not in measured]
+    if absent:
+        are = "is" if len(absent) == 1 else "are"
+        known = ", ".join(measured.names) or "nothing"
+        yield f"it reads {' and '.join(absent)}, which {are} not measured; there is {known}"
+    for signal in read:
+        if signal.name in measured:
+            yield from _apart(signal, measured.signal(signal.name), f"it reads {signal.name}", "measured")
+    if law.effort is None:
+        return
+    if law.effort.names != effort.names:
+        yield f"it commands {', '.join(law.effort.names)}, and the craft makes {', '.join(effort.names)}"
+    else:
+        for signal, made in zip(law.effort.signals, effort.signals, strict=True):
+            yield from _apart(signal, made, f"it commands {signal.name}", "made")
+
+
+def _apart(own: Signal, other: Signal, what: str, how: str) -> Iterator[str]:
+    if own.size != other.size:
+        yield f"{what} with {own.size} elements, and {other.size} are {how}"
+    elif (own.unit or "-") != (other.unit or "-"):
+        yield f"{what} in {own.unit or '-'}, and it is {how} in {other.unit or '-'}"
+    elif own.frame and other.frame and own.frame != other.frame:
+        yield f"{what} in the frame {own.frame!r}, and it is {how} in {other.frame!r}"
+
+
+def refuse(mission: Mission) -> None:
+    """Raise `FlightError` for parts of a mission that do not fit each other."""
+    if not mission.schemes:
+        raise FlightError(f"{mission.name} has no scheme; give at least one")
+    names = [scheme.name for scheme in mission.schemes]
+    for name in names:
+        if names.count(name) > 1:
+            raise FlightError(f"two schemes of {mission.name} are named {name!r}")
+    plant, craft = mission.truth, type(mission.craft).__name__
+    begun = {**mission.craft.start(), **mission.start_from}
+    if set(begun) != set(plant.state.names):
+        told = f"gives {', '.join(begun) or 'nothing'}, and the plant's state is {', '.join(plant.state.names)}"
+        raise FlightError(f"{craft}.start {told}; give each of them, and nothing else")
+    for signal in plant.state.signals:
+        count = len(begun[signal.name]) if hasattr(begun[signal.name], "__len__") else 1
+        if count != signal.size:
+            raise FlightError(f"{craft}.start gives {count} numbers of {signal.name}, expected {signal.size}")
+    for scheme in mission.schemes:
+        actuation, law = scheme.actuation, type(scheme.law)
+        if len(actuation.lower) != plant.inputs.size:
+            raise FlightError(
+                f"scheme {scheme.name!r} has bounds for {len(actuation.lower)} actuators, and the plant is told "
+                f"{plant.inputs.size} numbers ({', '.join(plant.inputs.names)})"
+            )
+        why = list(misfits(law, plant.measurement, scheme.law.belief, actuation.effort))
+        if why:
+            raise FlightError(
+                f"the law {law.__name__} of scheme {scheme.name!r} does not fit {craft}: {'; '.join(why)}"
+            )
+    for funnel in mission.funnels:
+        if funnel.signal not in plant.measurement:
+            known = ", ".join(plant.measurement.names)
+            raise FlightError(f"there is a funnel of {funnel.signal!r}, which is not measured; there is {known}")
+
+
+def complete(mission: Mission, metric: Metric) -> Metric:
+    """Return a metric with its unit; raise `FlightError` where a scheme does not record its signal."""
+    unit = ""
+    for scheme in mission.schemes:
+        row = Loop(mission, scheme).row
+        if metric.signal not in row:
+            raise FlightError(
+                f"{metric.signal!r} of the metric {metric.name!r} is no signal of scheme {scheme.name}; "
+                f"there is {', '.join(row.names)}"
+            )
+        unit = row.signal(metric.signal).unit
+    return replace(metric, unit="s" if metric.kind in ("settling", "reaching") else unit)

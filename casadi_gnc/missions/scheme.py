@@ -1,0 +1,62 @@
+"""What a mission is made of besides its craft: schemes that could fly it, funnels, metrics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from casadi_gnc.errors import FlightError
+from casadi_gnc.laws import Law, PerformanceFunnel
+from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.tables.part import Part
+
+Feedback = Literal["achieved", "wanted"]
+MetricKind = Literal["settling", "reaching", "peak", "least", "final", "mean", "sample_sum"]
+
+
+@dataclass(frozen=True, eq=False)
+class Scheme:
+    """One way to fly a mission.
+
+    Parameters
+    ----------
+    name : of files that are written.
+    law : what commands an effort.
+    actuation : how it becomes actuator commands; `Craft.actuation` makes one.
+    feedback : what observers and anti-windup are told was done: "achieved" by the actuators, or "wanted".
+    title : for whoever reads the results.
+    keys : the keys that `Craft.actuation` was given, if it was.
+    """
+
+    name: str
+    law: Law
+    actuation: Actuation
+    feedback: Feedback = "achieved"
+    title: str = ""
+    keys: Part | None = None
+
+    def __post_init__(self) -> None:
+        if self.feedback not in ("achieved", "wanted"):
+            raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
+
+
+@dataclass(frozen=True, eq=False)
+class Funnel:
+    """Bounds that a mission sets a measured signal, whichever law flies it."""
+
+    signal: str
+    bounds: PerformanceFunnel
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One number asked of a flight; kinds are defined in `casadi_gnc.missions.metrics`."""
+
+    name: str
+    kind: MetricKind
+    signal: str
+    threshold: float = 0.0
+    after: float = 0.0
+    unit: str = ""
+    until: float = float("inf")
+    norm: Literal["max", "two"] = "max"

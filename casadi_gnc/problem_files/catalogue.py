@@ -1,0 +1,178 @@
+"""What there is: laws and crafts with their gains and keys, and which law fits which craft, or why it does not."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from casadi_gnc.errors import GncError
+from casadi_gnc.laws import REGISTRY as LAWS
+from casadi_gnc.laws import Law, gains_of
+from casadi_gnc.missions import fitting
+from casadi_gnc.missions.craft import REGISTRY as CRAFTS
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.problem_files.document import Document, read_kind
+from casadi_gnc.problem_files.loading import craft_of, load
+from casadi_gnc.signals import Layout
+from casadi_gnc.tables.part import own_tables
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Hold one craft of a class, for what only an object can say."""
+
+    measured: Layout
+    effort: Layout
+    belief: Any
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """Hold a class by the name that a file uses, and the sentence about it."""
+
+    name: str
+    kind: Any
+
+    @property
+    def about(self) -> str:
+        """First sentence of the docstring."""
+        return " ".join((self.kind.__doc__ or "").strip().split("\n\n")[0].split())
+
+
+def laws(problem: str | Path | None = None) -> list[Named]:
+    """Return the laws that there are, and those that a mission file names beside them."""
+    found = [Named(name, LAWS.find(name)) for name in LAWS.names()]
+    if problem is None:
+        return found
+    document = read_kind(problem, "mission")
+    for table in document.data.get("scheme", []):
+        name = table.get("law", {}).get("type") if isinstance(table, dict) else None
+        if isinstance(name, str) and name not in [one.name for one in found]:
+            found.append(Named(name, LAWS.find(name, document.folder)))
+    return found
+
+
+def crafts(problem: str | Path | None = None) -> list[Named]:
+    """Return the crafts that there are, and the one that a mission file names."""
+    found = [Named(name, CRAFTS.find(name)) for name in CRAFTS.names()]
+    if problem is not None:
+        document = read_kind(problem, "mission")
+        name = document.data.get("spacecraft", {}).get("model")
+        if name not in [one.name for one in found]:
+            found.append(Named(str(name), craft_of(document)))
+    return found
+
+
+def sample_of(craft: Named, problem: str | Path | None = None) -> Sample | None:
+    """Return what one craft of a class measures, makes and believes: that of its example, or of a mission file.
+
+    None where a craft can be made of nothing that is known.
+    """
+    kind: type[Craft] = craft.kind if isinstance(craft.kind, type) else type(craft.kind)
+    try:
+        if kind.example is not None:
+            mission = load(kind.example, strict=False)
+            return Sample(mission.truth.measurement, mission.schemes[0].actuation.effort, mission.craft.belief())
+        if problem is not None and _names(read_kind(problem, "mission"), craft.name):
+            mission = load(problem, strict=False)
+            return Sample(mission.truth.measurement, mission.schemes[0].actuation.effort, mission.craft.belief())
+        made = kind()
+        return Sample(made.plant().measurement, made.actuation().effort, made.belief())
+    except GncError:
+        return None
+
+
+def _names(document: Document, craft: str) -> bool:
+    return document.data.get("spacecraft", {}).get("model") == craft
+
+
+def fits(law: Named, sample: Sample | None) -> list[str] | None:
+    """Return why a law does not fit a craft, nothing where it does, None where nobody can say."""
+    if sample is None:
+        return None
+    return list(fitting.misfits(law.kind, sample.measured, sample.belief, sample.effort))
+
+
+def gains(law: type[Law]) -> Iterator[dict[str, Any]]:
+    """Yield name, symbol, unit, size, default and meaning of each gain and option of a law."""
+    for name, declared in gains_of(law).items():
+        about = declared.metadata
+        least, above = about.get("minimum"), about.get("above")
+        yield {
+            "name": name,
+            "symbol": about["symbol"],
+            "unit": about["unit"],
+            "size": about.get("size", 1),
+            "range": f"> {above:g}" if above is not None else f">= {least:g}" if least is not None else "",
+            "choices": list(about.get("choices", ())),
+            "default": None if declared.default is dataclasses.MISSING else declared.default,
+            "required": declared.default is dataclasses.MISSING,
+            "meaning": about["note"],
+        }
+
+
+def keys(craft: type[Craft]) -> Iterator[dict[str, Any]]:
+    """Yield the keys of [spacecraft], the craft's own tables, and what it adds to a [[scheme]]."""
+    own = own_tables(craft)
+    for name, field in craft.model_fields.items():
+        where = f"[{name}]" if name in own else "[spacecraft]"
+        yield _key(where, name, field)
+    for name, field in craft.scheme_keys.model_fields.items():
+        yield _key("[[scheme]]", name, field)
+
+
+def _key(where: str, name: str, field: Any) -> dict[str, Any]:
+    return {"table": where, "name": name, "required": field.is_required(), "meaning": field.description or ""}
+
+
+def law_data(law: Named, samples: dict[str, Sample | None]) -> dict[str, Any]:
+    """Return all that is known of a law, as plain data."""
+    kind: type[Law] = law.kind
+    effort = kind.effort
+    found = {name: fits(law, sample) for name, sample in samples.items()}
+    return {
+        "name": law.name,
+        "class": f"{kind.__module__}.{kind.__qualname__}",
+        "about": law.about,
+        "reads": _reads(kind, samples),
+        "commands": None if effort is None else list(effort.names),
+        "models": getattr(kind.belief_kind(), "__name__", None),
+        "funnels": dict(kind.funnels),
+        "errata": dict(kind.errata),
+        "gains": list(gains(kind)),
+        "fits": [name for name, why in found.items() if why == []],
+        "does_not_fit": {name: why for name, why in found.items() if why},
+        "unknown": [name for name, why in found.items() if why is None],
+    }
+
+
+def _reads(kind: type[Law], samples: dict[str, Sample | None]) -> list[str]:
+    """Return the names of the signals that a law reads; those of the first craft that it models, where they differ."""
+    if isinstance(kind.inputs, Layout):
+        return list(kind.inputs.names)
+    belief = kind.belief_kind()
+    fitting_one = next((s.belief for s in samples.values() if s is not None and isinstance(s.belief, belief)), None)
+    return [] if fitting_one is None else list(kind.reads(fitting_one).names)
+
+
+def craft_data(craft: Named, sample: Sample | None, fitting_laws: list[str]) -> dict[str, Any]:
+    """Return all that is known of a craft, as plain data."""
+    kind: type[Craft] = craft.kind
+    return {
+        "name": craft.name,
+        "class": f"{kind.__module__}.{kind.__qualname__}",
+        "about": craft.about,
+        "example": kind.example,
+        "measures": None if sample is None else _columns(sample.measured),
+        "makes": None if sample is None else _columns(sample.effort),
+        "believes": None if sample is None or sample.belief is None else type(sample.belief).__name__,
+        "laws": fitting_laws,
+        "keys": list(keys(kind)),
+    }
+
+
+def _columns(layout: Layout) -> list[dict[str, Any]]:
+    return [{"name": s.name, "size": s.size, "unit": s.unit, "frame": s.frame} for s in layout.signals]

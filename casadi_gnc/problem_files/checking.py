@@ -1,0 +1,32 @@
+"""Check a problem file, of a mission or of a synthesis."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from casadi_gnc.checking import check
+from casadi_gnc.checks import Check
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.problem_files import synthesis_checks
+from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load
+
+
+def check_file(problem: str | Path, schemes: list[str] | None = None) -> tuple[str, list[Check]]:
+    """Return a title and all checks of a problem file, of a mission or of a synthesis.
+
+    Raises
+    ------
+    ProblemError
+        For a file that cannot be read or is of another kind.
+    """
+    document = read(problem)
+    kind = document.data.get("kind")
+    if kind == "synthesis":
+        return synthesis_checks.check(problem)
+    if kind != "mission":
+        message = f'kind is {kind!r}; check takes a file of kind "mission" or "synthesis"'
+        raise ProblemError(message, document.place(("kind",)))
+    mission = load(problem, strict=False)
+    names = schemes or [scheme.name for scheme in mission.schemes]
+    return mission.title or mission.name, [each for name in names for each in check(mission, name)]

@@ -1,0 +1,156 @@
+"""A problem file as it was read, and what is wrong with it, each with its line."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from casadi_gnc.errors import GncError, ProblemError
+from casadi_gnc.problem_files import toml_place
+from casadi_gnc.system import assets
+from casadi_gnc.system.text import refused
+from casadi_gnc.tables.complaints import sentences
+from casadi_gnc.tables.part import MisfitError
+
+Key = tuple[str | int, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """Hold a problem file: path, text and parsed content."""
+
+    path: Path
+    text: str
+    data: dict[str, Any]
+
+    @property
+    def folder(self) -> Path:
+        """The folder beside which the user's own code is looked for."""
+        return self.path.parent
+
+    def place(self, key: Key) -> str:
+        """Return "file, line n, table.key" for messages."""
+        return toml_place.describe(self.path, self.text, key)
+
+    def validated(self, model: Any) -> Any:
+        """Return the content checked by a pydantic model; raise `ProblemError` with every key that is wrong."""
+        complaints = Complaints(self)
+        found = complaints.checked(model, self.data)
+        complaints.settle()
+        return found
+
+    def with_data(self, data: dict[str, Any]) -> Document:
+        """Return the document with other content, told of at the places of this text."""
+        return replace(self, data=data)
+
+
+class Complaints:
+    """Gather what is wrong with a document, to tell all of it at once, in the order of the lines."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self._found: list[tuple[Key, str]] = []
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the document."""
+        return self._document.folder
+
+    def add(self, key: Key, message: str) -> None:
+        """Note what is wrong with a key; one sentence a key and message."""
+        if (key, message) not in self._found:
+            self._found.append((key, message))
+
+    def checked(self, model: type[BaseModel], data: Any, key: Key = ()) -> Any:
+        """Return data checked by a model, None where it does not fit; `key` is where the data stand."""
+        try:
+            return model.model_validate(data, context={"folder": self._document.folder})
+        except ValidationError as error:
+            for path, message in sentences(error, model, data):
+                self.add((*key, *path), message)
+        return None
+
+    @contextmanager
+    def about(self, *key: str | int) -> Iterator[None]:
+        """Note what is raised inside as being about a key; a `MisfitError` says which one below it."""
+        try:
+            yield
+        except MisfitError as error:
+            self.add((*key, *error.path), str(error))
+        except GncError as error:
+            self.add(key, str(error))
+
+    def settle(self) -> None:
+        """Raise one `ProblemError` with all that was noted, if anything was."""
+        if not self._found:
+            return
+        text = self._document.text
+        last = len(text) + 1
+        ordered = sorted(self._found, key=lambda each: toml_place.find(text, each[0]) or last)
+        told = [(message, self._document.place(key)) for key, message in ordered]
+        raise ProblemError.several(told)
+
+
+def shipped() -> list[str]:
+    """Return the names of the problems that come with the installation, e.g. "huang2020/detumble"."""
+    root = assets.folder("problems")
+    return sorted(path.relative_to(root).with_suffix("").as_posix() for path in root.rglob("*.toml"))
+
+
+def locate(problem: str | Path) -> Path:
+    """Return the path of a problem given by a path or by the name of a shipped one."""
+    path = Path(problem)
+    try:
+        if path.is_file():
+            return path
+        name = path.with_suffix("").as_posix()
+    except (OSError, ValueError) as error:
+        raise ProblemError(f"{str(problem)[:60]!r} names no file: {error}") from None
+    known = shipped()
+    if name.removeprefix("problems/") in known:
+        return assets.folder("problems") / f"{name.removeprefix('problems/')}.toml"
+    near = difflib.get_close_matches(name, known, 1)
+    hint = f'; did you mean "{near[0]}"?' if near else "; `casadi-gnc problems` lists those that are shipped"
+    raise ProblemError(f"no problem file {str(problem)!r}{hint}")
+
+
+def read(problem: str | Path) -> Document:
+    """Return a problem file as it stands; raise `ProblemError` on bad TOML."""
+    path = locate(problem)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
+    character = refused(text)  # in a comment too: the file travels with the packages that are made of it
+    if character:
+        number = next(k for k, line in enumerate(text.split("\n"), 1) if refused(line))
+        raise ProblemError(
+            f"holds the character {character}, which is invisible and can change what a reader takes the rest for; "
+            "leave it out",
+            f"{path.name}, line {number}",
+        )
+    return Document(path, text, parsed(text, path))
+
+
+def parsed(text: str, path: Path) -> dict[str, Any]:
+    """Return the content of a TOML text; raise `ProblemError` naming its file where it is none."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise ProblemError(f"is not valid TOML: {error}", path.name) from error
+
+
+def read_kind(problem: str | Path, kind: str) -> Document:
+    """Return a problem file; raise `ProblemError` if it is of another kind."""
+    document = read(problem)
+    if document.data.get("kind") != kind:
+        message = f'kind is {document.data.get("kind")!r}; this takes a file of kind "{kind}"'
+        raise ProblemError(message, document.place(("kind",)))
+    return document

@@ -1,0 +1,172 @@
+"""What every mission file may say: keys, units, shapes and ranges; the craft's own tables are the craft's.
+
+SI units and radians throughout, with the unit in the key where it helps. Unknown keys are errors.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, field_validator, model_validator
+
+from casadi_gnc.missions.scheme import MetricKind
+from casadi_gnc.tables.part import Name, NonNegative, Part, Positive
+
+
+def _is_one(value: Any) -> Any:
+    if value is not True and value == 1:
+        return value
+    raise ValueError(f"format is {value!r}; this version reads format 1")
+
+
+Format = Annotated[Literal[1], BeforeValidator(_is_one)]
+
+
+class FunnelTable(Part):
+    """Bounds on a measured signal: -below rho < s < above rho, rho from start to floor."""
+
+    signal: str = "mrp"
+    start: list[Positive]
+    floor: list[Positive]
+    decay_per_s: list[Positive]
+    below: list[Positive] = Field(description="share of rho allowed below zero")
+    above: list[Positive] = Field(description="share of rho allowed above zero")
+
+    @model_validator(mode="after")
+    def _fit(self) -> FunnelTable:
+        sizes = {name: len(getattr(self, name)) for name in ("start", "floor", "decay_per_s", "below", "above")}
+        if len(set(sizes.values())) > 1:
+            raise ValueError("lists of different length: " + ", ".join(f"{k} has {v}" for k, v in sizes.items()))
+        for i, (start, floor) in enumerate(zip(self.start, self.floor, strict=True), 1):
+            if floor > start:
+                raise ValueError(f"axis {i}: floor {floor:g} is wider than start {start:g}")
+        return self
+
+
+class TimingTable(Part):
+    """When things happen."""
+
+    mode: Literal["sampled", "continuous"]
+    sample_period_s: Positive
+    duration_s: Positive
+    plant_substeps: Annotated[int, Field(ge=1, le=1000)] = 1
+    record_period_s: Positive | None = Field(default=None, description="keep a sample so often; every one if left out")
+
+    @model_validator(mode="after")
+    def _whole(self) -> TimingTable:
+        samples = self.duration_s / self.sample_period_s
+        if not samples <= 1e9 or abs(samples - round(samples)) > 1e-6 * samples:
+            raise ValueError(f"duration_s / sample_period_s is {samples:.6g}; expected a whole number up to 1e9")
+        if self.record_period_s is not None and self.record_period_s > self.duration_s:
+            raise ValueError(
+                f"record_period_s {self.record_period_s:g} is longer than the flight, {self.duration_s:g} s"
+            )
+        kept = (self.record_period_s or self.sample_period_s) / self.sample_period_s
+        if kept < 0.5 or abs(kept - round(kept)) > 1e-6 * kept:
+            raise ValueError(f"record_period_s / sample_period_s is {kept:.6g}; expected a whole number")
+        return self
+
+
+class SchemeTable(Part):
+    """One way to fly the mission; a craft adds how far a law may ask and how its effort is allocated."""
+
+    name: Name
+    title: str = ""
+    feedback: Literal["achieved", "wanted"] = Field(
+        default="achieved", description="what observers and anti-windup are told was done"
+    )
+    as_printed: bool | list[str] = Field(default=False, description="keep the paper's errata: all, or those named")
+    law: dict[str, Any] = Field(description="type names the law, the other keys are its gains")
+
+    @field_validator("name")
+    @classmethod
+    def _is_no_file_of_ours(cls, value: str) -> str:
+        if value.lower() in ("comparison", "summary"):
+            raise ValueError(f"a scheme cannot be named {value!r}: a file of the results is called so")
+        return value
+
+
+class MetricTable(Part):
+    """One number asked of every flight."""
+
+    name: Name
+    kind: MetricKind
+    signal: str
+    threshold: Positive | None = Field(default=None, description="of settling and reaching: the norm is below it")
+    norm: Literal["max", "two"] | None = Field(
+        default=None, description="max: largest magnitude, two: 2-norm; two for a sample_sum, else max"
+    )
+    after_s: NonNegative = Field(default=0.0, description="begin of the window; not of a settling")
+    until_s: Positive | None = Field(default=None, description="end of the window; not of a settling")
+
+    @model_validator(mode="after")
+    def _complete(self) -> MetricTable:
+        if (self.kind in ("settling", "reaching")) != (self.threshold is not None):
+            raise ValueError("settling and reaching, and nothing else, take a threshold")
+        if self.kind == "settling" and (self.after_s or self.until_s):
+            raise ValueError("a settling looks at the whole flight and takes no after_s or until_s")
+        if self.until_s is not None and self.until_s < self.after_s:
+            raise ValueError(f"until_s {self.until_s:g} is before after_s {self.after_s:g}")
+        return self
+
+
+class NoiseTable(Part):
+    """How random numbers are drawn; how large each noise is stands in the craft's own tables."""
+
+    seed: Annotated[int, Field(ge=0, lt=2**63, description="the same seed gives the same flight")] = 1
+    period_s: Positive | None = Field(default=None, description="held so long; one sample period if left out")
+    truncation_sigma: Positive | None = Field(default=None, description="larger ones are cut to so many deviations")
+
+
+class SweepTable(Part):
+    """Fly every scheme once for each of some values of one key, and tabulate one result."""
+
+    name: Name
+    key: str = Field(description='where in the file, e.g. "scheme.*.force_limit_N.*"; * stands for every item')
+    values: Annotated[list[float | str | bool], Field(min_length=1)]
+    show: str = Field(description="a metric, or a status such as FUNNEL_LEFT, of which the first time is shown")
+
+
+class MissionTables(Part):
+    """What every mission file has besides the craft's tables and the schemes."""
+
+    format: Format
+    kind: Literal["mission"]
+    title: str = ""
+    source: str = ""
+    funnel: list[FunnelTable] = []
+    timing: TimingTable
+    noise: NoiseTable = NoiseTable()
+    metric: list[MetricTable] = []
+    sweep: list[SweepTable] = []
+    checks: list[str] = Field(default=[], description='further checks: names, or "./file.py:function"')
+
+    @field_validator("funnel", mode="before")
+    @classmethod
+    def _are_tables(cls, value: Any) -> Any:
+        if isinstance(value, dict):
+            raise ValueError("there may be several funnels; write [[funnel]], not [funnel]")
+        return value
+
+    @field_validator("funnel")
+    @classmethod
+    def _signals_differ(cls, value: list[FunnelTable]) -> list[FunnelTable]:
+        signals = [funnel.signal for funnel in value]
+        for signal in signals:
+            if signals.count(signal) > 1:
+                raise ValueError(f"{signal!r} has two funnels")
+        return value
+
+    @field_validator("metric", "sweep")
+    @classmethod
+    def _names_differ(cls, value: list[Any]) -> list[Any]:
+        return names_differ(value)
+
+
+def names_differ(value: list[Any]) -> list[Any]:
+    """Return tables as they came; raise `ValueError` where two have one name."""
+    names = [item.name for item in value]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"the name {name!r} is given twice")
+    return value

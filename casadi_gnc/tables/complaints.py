@@ -1,0 +1,130 @@
+"""What is wrong with a table, one sentence a key, in the words of who wrote the file."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+
+from casadi_gnc.tables.part import MisfitError
+
+Path = tuple[str | int, ...]
+#: A misspelled key leaves the right one missing: so alike that they are one mistake.
+_ONE_MISTAKE = 0.6
+
+
+def sentences(error: ValidationError, model: type[BaseModel], data: Any) -> list[tuple[Path, str]]:
+    """Return the path of each key that is wrong, and what is wrong with it; one sentence a key.
+
+    Parameters
+    ----------
+    error : what pydantic found.
+    model : which model it was.
+    data : the content that was given, to tell keys of the file from alternatives that were tried.
+    """
+    found: dict[Path, tuple[str, str]] = {}
+    for problem in error.errors(include_url=False):
+        path = _path(problem, data)
+        context = problem.get("ctx", {}).get("error")
+        if isinstance(context, MisfitError):
+            path = (*path, *context.path)
+        found.setdefault(path, (problem["type"], _sentence(problem, path, model, data)))
+    unknown = [path for path, (kind, _) in found.items() if kind == "extra_forbidden"]
+    return [
+        (path, text)
+        for path, (kind, text) in found.items()
+        if not (kind == "missing" and any(_is_meant(path, other) for other in unknown))
+    ]
+
+
+def _is_meant(missing: Path, given: Path) -> bool:
+    same_table = missing[:-1] == given[:-1]
+    return same_table and bool(difflib.get_close_matches(str(given[-1]), [str(missing[-1])], 1, _ONE_MISTAKE))
+
+
+def _path(problem: Any, data: Any) -> Path:
+    """Return the place in the file: locations of unions also name the alternative that was tried."""
+    path: list[str | int] = []
+    at: Any = data
+    for part in problem["loc"]:
+        if _inside(at, part):
+            at = at[part]
+        elif part != problem["loc"][-1] or problem["type"] != "missing":
+            continue
+        path.append(part)
+    return tuple(path)
+
+
+def _inside(at: Any, part: str | int) -> bool:
+    if isinstance(at, dict):
+        return part in at
+    return isinstance(at, list) and isinstance(part, int) and part < len(at)
+
+
+def value_at(data: Any, path: Path) -> Any:
+    """Return what stands at a path of the data; None where nothing does."""
+    for part in path:
+        if not _inside(data, part):
+            return None
+        data = data[part]
+    return data
+
+
+def _sentence(problem: Any, path: Path, model: type[BaseModel], data: Any) -> str:
+    kind, given = problem["type"], value_at(data, path)
+    if kind == "extra_forbidden":
+        return "unknown key" + near_key(str(path[-1]), keys_at(model, problem["loc"][:-1], data))
+    if kind == "missing":
+        return "is missing"
+    if kind == "value_error":
+        return str(problem.get("ctx", {}).get("error", problem["msg"]))
+    if kind == "model_type":
+        return f"is {given!r}, expected a table"
+    if kind == "union_tag_invalid":
+        told = problem["ctx"]
+        known = told["expected_tags"].replace("'", "").split(", ")
+        near = difflib.get_close_matches(str(told["tag"]), known, 1)
+        sentence = f"unknown {told['discriminator'].strip(chr(39))} {told['tag']!r}"
+        return sentence + (f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}")
+    if kind == "union_tag_not_found":
+        return f"lacks the key {problem['ctx']['discriminator']}"
+    text = problem["msg"][0].lower() + problem["msg"][1:]
+    if not isinstance(given, (dict, list)):
+        text += f", got {given!r}"
+    if kind == "list_type" and path and isinstance(path[-1], int):
+        text += "; a matrix is written as rows, [[a, 0, 0], [0, b, 0], [0, 0, c]]"
+    return text
+
+
+def near_key(key: str, known: list[str]) -> str:
+    """Return a hint at the key that was probably meant."""
+    near = difflib.get_close_matches(key, known, 1)
+    return f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(known)}"
+
+
+def keys_at(model: type[BaseModel], location: Path, data: Any) -> list[str]:
+    """Return the keys that a table may have; in a union, those of the alternative that the table names."""
+    kinds, at = [model], data
+    for part in location:
+        inner = [field for kind in kinds if (field := kind.model_fields.get(str(part))) is not None]
+        if inner:
+            kinds = [found for field in inner for found in _models(field.annotation)]
+        if _inside(at, part):
+            at = at[part]
+        elif any(part in _tags(kind) for kind in kinds):
+            kinds = [kind for kind in kinds if part in _tags(kind)]
+    return list(dict.fromkeys(name for kind in kinds for name in kind.model_fields))
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models(inner)
+
+
+def _tags(kind: type[BaseModel]) -> set[Any]:
+    """Return the words by which a table of this kind is told from others."""
+    return {word for field in kind.model_fields.values() for word in get_args(field.annotation)}

@@ -1,0 +1,77 @@
+"""What every table of a problem file is: a pydantic model that takes SI numbers and refuses all else.
+
+`Part` is the base, the annotated types below are its vocabulary. SI units and radians throughout, with the
+unit in the key where it helps; unknown keys, infinities, NaN and numbers as text are refused.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from casadi_gnc.system.text import refused
+
+Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
+Rows = Annotated[list[Vector], Field(min_length=1)]
+Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Angle = Annotated[float, Field(ge=-2 * math.pi, le=2 * math.pi, description="in radians")]
+Angles = Annotated[list[Angle], Field(min_length=3, max_length=3)]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]{0,62}$", description="letters, digits and _")]
+
+
+class Part(BaseModel):
+    """Base of all parts of a file."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _can_be_read(cls, value: Any) -> Any:
+        for text in value if isinstance(value, list) else [value]:
+            if isinstance(text, str) and (character := refused(text)):
+                raise ValueError(
+                    f"holds the character {character}, which is invisible and can change what a reader, a terminal or "
+                    "a compiler takes the rest for; leave it out"
+                )
+        return value
+
+
+class MisfitError(ValueError):
+    """Say that keys do not fit each other, and which one to look at.
+
+    Parameters
+    ----------
+    message : what was given, what was expected, what to do.
+    path : of the key, below the table whose validator raises it.
+    """
+
+    def __init__(self, message: str, *path: str | int) -> None:
+        self.path = path
+        super().__init__(message)
+
+
+def table(default: Any = ..., note: str = "") -> Any:
+    """Declare a field of a craft that is a table of its own in a file, [initial], and no key of [spacecraft]."""
+    return Field(default, description=note or None, json_schema_extra={"table": True})
+
+
+def own_tables(model: type[BaseModel]) -> list[str]:
+    """Return the fields of a craft that are tables of their own."""
+    extras = ((name, field.json_schema_extra) for name, field in model.model_fields.items())
+    return [name for name, extra in extras if isinstance(extra, dict) and extra.get("table")]
+
+
+def plain(value: Any) -> Any:
+    """Return a value as TOML would give it: arrays, tuples and CasADi numbers as lists."""
+    if isinstance(value, (list, tuple)):
+        return [plain(each) for each in value]
+    if isinstance(value, dict):
+        return {key: plain(each) for key, each in value.items()}
+    if hasattr(value, "full"):  # casadi.DM
+        value = value.full()
+        value = value.ravel() if 1 in value.shape else value
+    return value.tolist() if hasattr(value, "tolist") else value
