@@ -274,6 +274,6 @@ def test_a_continuous_mission_flies_sampled():
 def test_float_package_warns_where_rounding_matters():
     """A measurement of 1e5 m rounds to 4 mm in a float; a law that reads it says so."""
     mission = casadi_gnc.load("huang2020/slew")
-    assert packaging._warnings(mission, "funnel_pinv", "float64") == []
+    assert packaging.warnings(mission, "funnel_pinv", "float64") == []
     stiff = mission.with_scheme("pd_pinv", attitude_gain=1e6)
-    assert "numbers.float32" in packaging._warnings(stiff, "pd_pinv", "float32")[0]
+    assert "numbers.float32" in packaging.warnings(stiff, "pd_pinv", "float32")[0]
