@@ -10,7 +10,6 @@ import difflib
 import re
 import shutil
 import subprocess
-import tempfile
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from casadi_gnc.embedded import stack
 from casadi_gnc.errors import TargetError
 from casadi_gnc.registry import Registry
 from casadi_gnc.system import assets
+from casadi_gnc.system.folders import workshop
 
 #: Flags of every target; the same as on the host, with sections that the linker may drop.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-ffunction-sections", "-fdata-sections")
@@ -200,8 +200,7 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
         package of floats, or the program does not end well.
     """
     target.need()
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        shop = Path(workshop)
+    with workshop() as shop:
         objects = [
             _compile(source, shop, folder, target, (*FLAGS, optimise, "-fcallgraph-info=su"))
             for source in units(folder, name)

@@ -15,7 +15,6 @@ import numpy as np
 
 from casadi_gnc.allocation import Allocate, OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
-from casadi_gnc.embedded.source import environment
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.noise import uniform_count, uniforms
 from casadi_gnc.missions.mission import Mission
@@ -24,6 +23,7 @@ from casadi_gnc.missions.tapes import Tapes, call
 from casadi_gnc.registry import Registry
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers
+from casadi_gnc.system.templates import template
 
 #: Engines by name: shipped ones, and those of installed packages; each is made of (mission, scheme, tapes).
 REGISTRY = Registry(
@@ -80,39 +80,35 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         """Return the call of a tape; `sample` owns what one evaluation of the controller leaves behind."""
         return call(tapes.functions[name], _places(sample) | places)
 
-    return (
-        environment()
-        .get_template("flight.c.j2")
-        .render(
-            title=f"{mission.name}, scheme {scheme.name}",
-            mode=timing.mode,
-            maths=maths,
-            real="double",
-            states=plant.state.size,
-            measurements=plant.measurement.size,
-            memory=scheme.law.memory.size,
-            efforts=scheme.actuation.effort.size,
-            actuators=plant.inputs.size,
-            noise=plant.noise.size,
-            noise_every=mission.noise.every,
-            uniforms=uniform_count(plant.noise.size),
-            report=scheme.actuation.allocator.report.size,
-            row=tapes.row.size,
-            tally=tapes.tally.size,
-            substeps=timing.substeps,
-            period=c_constant(timing.sample_period),
-            symbolic=tapes.symbolic,
-            online=isinstance(scheme.actuation.allocator, OnlineInFlight),
-            inexact=StepStatus.ALLOCATION_INEXACT.value,
-            failed=StepStatus.ALLOCATION_FAILED.value,
-            fused=fused,
-            call=called,
-            tapes=[
-                print_function(tape, maths=maths)
-                for name, tape in tapes.functions.items()
-                if not (fused and name in ("before", "allocate"))
-            ],
-        )
+    return template("flight.c.j2").render(
+        title=f"{mission.name}, scheme {scheme.name}",
+        mode=timing.mode,
+        maths=maths,
+        real="double",
+        states=plant.state.size,
+        measurements=plant.measurement.size,
+        memory=scheme.law.memory.size,
+        efforts=scheme.actuation.effort.size,
+        actuators=plant.inputs.size,
+        noise=plant.noise.size,
+        noise_every=mission.noise.every,
+        uniforms=uniform_count(plant.noise.size),
+        report=scheme.actuation.allocator.report.size,
+        row=tapes.row.size,
+        tally=tapes.tally.size,
+        substeps=timing.substeps,
+        period=c_constant(timing.sample_period),
+        symbolic=tapes.symbolic,
+        online=isinstance(scheme.actuation.allocator, OnlineInFlight),
+        inexact=StepStatus.ALLOCATION_INEXACT.value,
+        failed=StepStatus.ALLOCATION_FAILED.value,
+        fused=fused,
+        call=called,
+        tapes=[
+            print_function(tape, maths=maths)
+            for name, tape in tapes.functions.items()
+            if not (fused and name in ("before", "allocate"))
+        ],
     )
 
 
