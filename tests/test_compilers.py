@@ -76,7 +76,7 @@ def test_unwritable_cache_falls_back(monkeypatch, tmp_path):
 
 def test_two_processes_may_build_at_once(folder):
     script = (
-        "from pathlib import Path; from casadi_gnc import compilers; "
+        "from pathlib import Path; from casadi_gnc.system import compilers; "
         f"print(compilers.build({SOURCE!r}, include=Path({str(INCLUDE)!r})))"
     )
     runs = [
