@@ -81,14 +81,14 @@ PIP := -m pip --quiet --disable-pip-version-check install
 # The package itself is built by the back end from the lock, not by one that pip fetches for itself.
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "casadi-gnc needs Python 3.11 or newer; make PYTHON=/path/to/python3.x")'
-	@echo "Installing what flying needs into .venv: about 150 MB, half a minute on a fast connection; pip says nothing meanwhile."
+	@echo "Installing what flying needs into .venv: 170 MB to fetch, half a minute on a fast connection; pip says nothing meanwhile."
 	$(PYTHON) -m venv .venv
 	$(BIN)/python $(PIP) --require-hashes --requirement requirements.lock
 	$(BIN)/python $(PIP) --no-deps --no-build-isolation --editable .
 	touch $@
 
 .venv/installed-dev: .venv/installed requirements-dev.lock
-	@echo "Installing what tests and documentation need into .venv: about 250 MB, half a minute on a fast connection."
+	@echo "Installing what tests and documentation need into .venv: 200 MB more to fetch, half a minute on a fast connection."
 	$(BIN)/python $(PIP) --require-hashes --requirement requirements-dev.lock
 	touch $@
 
