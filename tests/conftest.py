@@ -1,4 +1,4 @@
-"""Shared fixtures: random numbers with a seed, compilers that CI must have, missions loaded once."""
+"""Shared fixtures: random numbers with a seed, compilers, missions loaded once; and the marker `tools`."""
 
 import os
 import shutil
@@ -13,6 +13,17 @@ from casadi_gnc.system.compilers import Compiler, _probe
 
 # Independent implementations that tests and benchmarks compare with.
 sys.path.insert(0, str(Path(__file__).parent / "oracles"))
+
+
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Without a program that a test is marked to need fail in CI, and skip by name elsewhere."""
+    named = [program for mark in item.iter_markers("tools") for program in mark.args]
+    lacking = [program for program in named if shutil.which(program) is None]
+    if lacking:
+        text = f"{', '.join(lacking)} is not installed; CONTRIBUTING.md says what `make test-all` needs"
+        if os.environ.get("CI") == "true":
+            pytest.fail(text, pytrace=False)
+        pytest.skip(text)
 
 
 @pytest.fixture
@@ -38,17 +49,8 @@ def detumble() -> casadi_gnc.Mission:
     return casadi_gnc.load("huang2020/detumble")
 
 
-def need_compiler(name: str) -> Compiler:
-    """Return a compiler by name; without it fail in CI and skip, by name, elsewhere."""
-    if shutil.which(name) is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail(f"CI needs the compiler {name}")
-        pytest.skip(f"the compiler {name} is not installed")
-    found = _probe((name,))
-    assert found is not None
-    return found
-
-
-@pytest.fixture(params=["gcc", "clang"])
+@pytest.fixture(params=["gcc", pytest.param("clang", marks=pytest.mark.tools("clang"))])
 def compiler(request: pytest.FixtureRequest) -> Compiler:
-    return need_compiler(request.param)
+    found = _probe((request.param,))
+    assert found is not None, f"{request.param} cannot be run"
+    return found

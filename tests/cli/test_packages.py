@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from packages import copied, made, need_target, run
+from packages import copied, made, needs_target, run
 
 
 def command(*words, **environment):
@@ -45,8 +45,8 @@ def test_generate_make_verify(tmp_path):
     assert text.endswith("</html>\n")
 
 
+@needs_target("cortex-m4f")
 def test_verify_on_a_target(tmp_path):
-    need_target("cortex-m4f")
     page = tmp_path / "verify.html"
     folder = made("huang2020/slew", "funnel_pinv", "float32")
     done = command("verify", folder, "--target", "host,cortex-m4f", "--report", page)
@@ -57,8 +57,8 @@ def test_verify_on_a_target(tmp_path):
     assert "Cortex-M4F" in page.read_text()
 
 
+@needs_target("cortex-m7")
 def test_numbers_of_a_target_reach_the_readme(tmp_path):
-    need_target("cortex-m7")
     folder = tmp_path / "flight"
     done = command("generate", "huang2020/slew", "--out", folder, "--target", "cortex-m7")
     assert done.returncode == 0, done.stderr

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shipped_missions import missions
+from shipped_missions import missions, parametrized
 
 from casadi_gnc.checking import check
 from casadi_gnc.missions import tapes
@@ -13,7 +13,7 @@ EVERY = [(name, scheme.name) for name, mission in missions().items() for scheme 
 SAMPLES = 40
 
 
-@pytest.mark.parametrize(("problem", "scheme"), EVERY)
+@pytest.mark.parametrize(("problem", "scheme"), parametrized(EVERY))
 def test_engines_write_the_same_words(problem, scheme):
     """Every scheme of every mission, in its own mode, noise and faults included, with libm on both sides."""
     mission = missions()[problem].with_scheme(scheme)
@@ -32,7 +32,7 @@ def test_engines_write_the_same_words(problem, scheme):
     assert not differ.any(), [name for name in built.row.names if differ[:, built.row.place(name)].any()]
 
 
-@pytest.mark.parametrize("problem", sorted(missions()))
+@pytest.mark.parametrize("problem", parametrized([(name,) for name in sorted(missions())]))
 def test_every_shipped_mission_can_be_checked(problem):
     found = check(missions()[problem])
     assert found

@@ -2,7 +2,6 @@
 
 import atexit
 import functools
-import os
 import shutil
 import subprocess
 import tempfile
@@ -45,12 +44,7 @@ def run(*command, folder: Path | None = None, environment: dict | None = None) -
     )
 
 
-def need_target(name: str) -> targets.Target:
-    """Return a target; without its tools fail in CI and skip, by name, elsewhere."""
+def needs_target(name: str) -> pytest.MarkDecorator:
+    """Return the mark of a test that compiles for a target and runs in its emulator."""
     target = targets.find(name)
-    if target.missing():
-        text = f"target {name} lacks {', '.join(target.missing())}: make targets"
-        if os.environ.get("CI") == "true":
-            pytest.fail(text)
-        pytest.skip(text)
-    return target
+    return pytest.mark.tools(target.compiler, target.emulator[0])
