@@ -17,8 +17,9 @@ from casadi_gnc.benchmarks.contest import Accuracy, Family, Judgement, digest
 from casadi_gnc.benchmarks.machine import version
 from casadi_gnc.errors import BenchmarkError, NoCompilerError
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine, VirtualMachineEngine
+from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files.loading import load
 from casadi_gnc.system import compilers

@@ -43,7 +43,7 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] 
 def examine() -> dict[str, Any]:
     """Return what the doctor finds, as plain data."""
     from casadi_gnc.allocation import backends
-    from casadi_gnc.embedded import targets
+    from casadi_gnc.embedded import boards
     from casadi_gnc.system import compilers
 
     packages, missing = {}, []
@@ -71,7 +71,7 @@ def examine() -> dict[str, Any]:
         "packages": packages,
         "compilers": [{"command": " ".join(c.command), "version": c.version} for c in found],
         "solvers": backends.available(),
-        "targets": {name: targets.find(name).missing() for name in targets.names()},
+        "targets": {name: boards.find(name).missing() for name in boards.names()},
         "cache": {"folder": str(folder), "libraries": libraries},
         "missing": missing,
     }

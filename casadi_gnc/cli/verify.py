@@ -18,11 +18,11 @@ def verify(
 ) -> None:
     """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs."""
     from casadi_gnc.delivery.verifying import verify as run
-    from casadi_gnc.embedded import targets
+    from casadi_gnc.embedded import boards
 
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
     if "all" in wanted:
-        wanted = ["host", *targets.names()]
+        wanted = ["host", *boards.names()]
     found = run(package, wanted)
     if report is not None:
         _write(report, found)

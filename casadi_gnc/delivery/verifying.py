@@ -11,6 +11,7 @@ import numpy as np
 
 from casadi_gnc.delivery import making
 from casadi_gnc.delivery.packaging import REALS, warnings
+from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import compare, package, targets
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.host import HostPackage
@@ -47,7 +48,7 @@ def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, A
         raise PackageError(f"{folder} is no package: its {package.MANIFEST} does not say {', '.join(lacking)}")
     if about["real"] not in REALS:
         raise PackageError(f"{folder} is no package of this version: its numbers are {about['real']!r}")
-    boards = [targets.find(one) for one in dict.fromkeys(target) if one != "host"]
+    boards = [known_boards.find(one) for one in dict.fromkeys(target) if one != "host"]
     for board in boards:
         board.need()
     inputs, outputs = read_vectors(folder, about["real"])
@@ -58,7 +59,7 @@ def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, A
     report["warnings"] = warnings(mission, controller.scheme, about["real"])
     report["not_regenerated"] = _changed(folder, package.flight_files(controller, options))
     report["comparisons"], report["targets"] = [], []
-    every = [targets.find(one) for one in targets.names()]
+    every = [known_boards.find(one) for one in known_boards.names()]
     report["not_installed"] = {one.name: one.missing() for one in every if one.missing()}
     if "host" in target:
         report["comparisons"] += _on_host(folder, controller, options, inputs, outputs)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law
 from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.recording import row_of
 from casadi_gnc.missions.scheme import Metric
 from casadi_gnc.signals import Layout, Signal
 
@@ -100,7 +101,7 @@ def complete(mission: Mission, metric: Metric) -> Metric:
     """Return a metric with its unit; raise `FlightError` where a scheme does not record its signal."""
     unit = ""
     for scheme in mission.schemes:
-        row = Loop(mission, scheme).row
+        row = row_of(Loop(mission, scheme))
         if metric.signal not in row:
             raise FlightError(
                 f"{metric.signal!r} of the metric {metric.name!r} is no signal of scheme {scheme.name}; "

@@ -12,10 +12,11 @@ import numpy as np
 from casadi_gnc.embedded.printer import Math
 from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.missions import metrics, tapes
-from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engine, VirtualMachineEngine
+from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engine
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.loop import funnel_signals
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.timing import Mode
 from casadi_gnc.status import StepStatus

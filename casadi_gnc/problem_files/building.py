@@ -15,7 +15,8 @@ from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import asking, fitting
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
-from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.origin import Origin
 from casadi_gnc.missions.parts import actuation_of, belief_of, plant_of, start_of
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.timing import Noise, Timing

@@ -19,7 +19,8 @@ from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.laws import Law
 from casadi_gnc.missions.craft import REGISTRY as CRAFTS
 from casadi_gnc.missions.craft import Craft
-from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.origin import Origin
 from casadi_gnc.problem_files import building
 from casadi_gnc.problem_files.changing import changed
 from casadi_gnc.problem_files.document import Complaints, Document, read_kind

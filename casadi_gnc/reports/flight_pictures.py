@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.loop import funnel_signals
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.system.files import write_beside
 from casadi_gnc.system.text import picture
 

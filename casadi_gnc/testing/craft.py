@@ -8,8 +8,9 @@ import numpy as np
 
 from casadi_gnc.checking import check
 from casadi_gnc.missions import fitting, tapes
-from casadi_gnc.missions.engines import CompiledEngine, VirtualMachineEngine
+from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.testing.asserting import must
 from casadi_gnc.testing.law import check_law

@@ -108,7 +108,7 @@ def test_schema_accepts_the_shipped_problems():
     for name in casadi_gnc.shipped():
         validator.validate(tomllib.loads(read(name).text))
     with pytest.raises(jsonschema.ValidationError):
-        validator.validate({**tomllib.loads(text), "mood": 1})
+        validator.validate({**tomllib.loads(read("huang2020/detumble").text), "mood": 1})
 
 
 def test_doctor_tells_what_is_there():

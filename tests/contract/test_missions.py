@@ -6,8 +6,9 @@ from shipped_missions import missions, parametrized
 
 from casadi_gnc.checking import check
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.engines import CompiledEngine, VirtualMachineEngine
+from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 
 EVERY = [(name, scheme.name) for name, mission in missions().items() for scheme in mission.schemes]
 SAMPLES = 40

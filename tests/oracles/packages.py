@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from casadi_gnc.delivery.packaging import generate
-from casadi_gnc.embedded import targets
+from casadi_gnc.embedded import boards
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-pedantic", "-Werror"]
 C99 = ["-std=c99", "-Wmissing-prototypes", "-ffp-contract=off", "-fno-math-errno"]
@@ -46,5 +46,5 @@ def run(*command, folder: Path | None = None, environment: dict | None = None) -
 
 def needs_target(name: str) -> pytest.MarkDecorator:
     """Return the mark of a test that compiles for a target and runs in its emulator."""
-    target = targets.find(name)
+    target = boards.find(name)
     return pytest.mark.tools(target.compiler, target.emulator[0])
