@@ -162,8 +162,7 @@ class Lopsided(StarterCraft):
     """Push to one side of a plane."""
 
     def actuators(self):
-        columns = np.array([[1, 0, 0.1], [-1, 0, 0.1], [0, 1, 0.1], [0, -1, 0.1]]).T
-        return gnc.Actuators(ca.DM(columns), [0.0] * 4, [1.0] * 4)
+        return gnc.Actuators(ca.DM.eye(3), [0.0] * 3, [1.0] * 3)
 
 
 def test_a_guest_is_failed_too():
@@ -172,7 +171,7 @@ def test_a_guest_is_failed_too():
     mission = gnc.Mission(craft, [gnc.Scheme("one", Damping(), craft.actuation())], gnc.Timing("sampled", 0.1, 10.0))
     (found,) = [each for each in gnc.check(mission) if each.name == "authority.span"]
     assert found.verdict == "fail"
-    both = replace(mission.schemes[0].actuation, lower=[-1.0] * 4)
+    both = replace(mission.schemes[0].actuation, lower=[-1.0] * 3)
     assert authority.spanned(mission, replace(mission.schemes[0], actuation=both)) > 0
 
 
@@ -287,12 +286,12 @@ def test_a_check_of_ones_own_is_told_with_the_others(tmp_path):
     (tmp_path / "mine.py").write_text(
         "import casadi_gnc as gnc\n\n"
         "def long(mission, scheme):\n"
-        '    yield gnc.Check("mine.duration", mission.timing.duration, 100.0, "s", "warn", "It is long.", "Cut it.", "me")\n'
+        '    yield gnc.Check("mine.long", mission.timing.duration, 1e2, "s", "warn", "Long.", "Cut.", "me")\n'
     )
     text = gnc.problem_files.read("huang2020/detumble").text
     (tmp_path / "long.toml").write_text(text.replace("format = 1", 'format = 1\nchecks = ["./mine.py:long"]'))
     found = gnc.check(tmp_path / "long.toml", "damping_pinv")
-    assert [each.verdict for each in found if each.name == "mine.duration"] == ["warn"]
+    assert [each.verdict for each in found if each.name == "mine.long"] == ["warn"]
 
 
 def test_problem_of_a_robust_allocation_stays_one():
