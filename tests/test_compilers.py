@@ -33,17 +33,17 @@ def fake(tmp_path):
 
 
 def test_second_build_is_the_cached_one(folder):
-    first = compilers.build(SOURCE, include=INCLUDE)
+    first = compilers.compiled(SOURCE, include=INCLUDE)
     stamp = first.stat().st_mtime_ns
-    assert compilers.build(SOURCE, include=INCLUDE) == first
+    assert compilers.compiled(SOURCE, include=INCLUDE) == first
     assert first.stat().st_mtime_ns == stamp
-    assert compilers.build(SOURCE + "\n", include=INCLUDE) != first
-    assert compilers.build(SOURCE, include=INCLUDE, flags=("-O0",)) != first
+    assert compilers.compiled(SOURCE + "\n", include=INCLUDE) != first
+    assert compilers.compiled(SOURCE, include=INCLUDE, flags=("-O0",)) != first
 
 
 def test_refused_source_is_told_and_leaves_nothing(folder):
     with pytest.raises(CompilerError, match="refused the generated source: .*error"):
-        compilers.build("int broken(void) { return", include=INCLUDE)
+        compilers.compiled("int broken(void) { return", include=INCLUDE)
     assert list(folder.iterdir()) == []
 
 
@@ -51,9 +51,9 @@ def test_interrupted_compiler_leaves_no_entry(folder, fake, tmp_path):
     """A compiler that dies half way through its output: the half file is not taken for a library."""
     killed = fake('while [ "$1" != "-o" ]; do shift; done; printf half > "$2"; kill -9 $$')
     with pytest.raises(CompilerError):
-        compilers.build(SOURCE, include=INCLUDE, compiler=killed)
+        compilers.compiled(SOURCE, include=INCLUDE, compiler=killed)
     assert [path.name for path in folder.iterdir()] == ["fakecc"]
-    assert compilers.build(SOURCE, include=INCLUDE).stat().st_size > 1000
+    assert compilers.compiled(SOURCE, include=INCLUDE).stat().st_size > 1000
 
 
 def test_no_compiler(monkeypatch):
@@ -72,13 +72,13 @@ def test_unwritable_cache_falls_back(monkeypatch, tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("in the way")
     monkeypatch.setenv(compilers.CACHE_VARIABLE, str(blocked / "cache"))
-    assert compilers.build(SOURCE, include=INCLUDE).exists()
+    assert compilers.compiled(SOURCE, include=INCLUDE).exists()
 
 
 def test_two_processes_may_build_at_once(folder):
     script = (
         "from pathlib import Path; from casadi_gnc.system import compilers; "
-        f"print(compilers.build({SOURCE!r}, include=Path({str(INCLUDE)!r})))"
+        f"print(compilers.compiled({SOURCE!r}, include=Path({str(INCLUDE)!r})))"
     )
     runs = [
         subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, env=dict(os.environ)) for _ in range(2)
@@ -94,7 +94,7 @@ def test_a_full_disk_is_told_from_a_refusal(folder, fake, monkeypatch):
     with pytest.raises(
         CompilerError, match=f"{folder} has no space left; .*; set {compilers.CACHE_VARIABLE} or TMPDIR to"
     ):
-        compilers.build(SOURCE, include=INCLUDE, compiler=said)
+        compilers.compiled(SOURCE, include=INCLUDE, compiler=said)
 
 
 def test_a_library_that_may_not_run_names_its_folder(folder, monkeypatch):
@@ -110,7 +110,7 @@ def test_complaints_are_in_english(folder, fake):
     """They are looked through for their cause."""
     asking = fake('echo "error: $LC_ALL" >&2; exit 1')
     with pytest.raises(CompilerError, match="refused the generated source: error: C$"):
-        compilers.build(SOURCE, include=INCLUDE, compiler=asking)
+        compilers.compiled(SOURCE, include=INCLUDE, compiler=asking)
 
 
 def compiler(*command, version):

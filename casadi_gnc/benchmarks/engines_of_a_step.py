@@ -129,7 +129,7 @@ def casadi_c_way(function: ca.Function) -> Way:
     """Return CasADi's own C, compiled with the same flags and called through CasADi's buffers."""
     generator = ca.CodeGenerator(function.name())
     generator.add(function)
-    path = compilers.build(generator.dump(), include=assets.folder("codegen") / "runtime", flags=_FLAGS)
+    path = compilers.compiled(generator.dump(), include=assets.folder("codegen") / "runtime", flags=_FLAGS)
     return buffer_way(ca.external(function.name(), str(path)))
 
 

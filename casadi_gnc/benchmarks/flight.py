@@ -88,7 +88,7 @@ def _family(problem: str, samples: int | None) -> Family:
     whole = min(DURATION, mission.timing.duration)
     count = max(min(samples or 10**9, int(whole / mission.timing.sample_period) + 1), 2)
     mission = _shortened(name, count)
-    built = tapes.build(mission, scheme)
+    built = tapes.tapes_of(mission, scheme)
     record = np.zeros((count, built.row.size))
     carried = _flown(VirtualMachineEngine(mission, scheme, built), mission, built, record)
     end = carried.x.copy()
@@ -133,7 +133,7 @@ class FlightRunner:
             self._run = _folded(mission, loop)
             return
         scheme = mission.scheme(loop.scheme)
-        built = tapes.build(mission, scheme)
+        built = tapes.tapes_of(mission, scheme)
         made: Engine
         if engine == "vm":
             made = VirtualMachineEngine(mission, scheme, built)

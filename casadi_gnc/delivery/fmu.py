@@ -50,5 +50,5 @@ def generate_fmu(
     files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration)
     prepare_folder(target.parent)
     with workshop() as shop:
-        write_beside(target, lambda place: fmu.build(files, options, shop, place))
+        write_beside(target, lambda place: fmu.pack(files, options, shop, place))
     return target

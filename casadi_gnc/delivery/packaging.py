@@ -85,7 +85,7 @@ def generate(
         "made_by": {"casadi_gnc": metadata.version("casadi-gnc"), "casadi": metadata.version("casadi")},
     }
 
-    def build(workshop: Path) -> dict[str, str]:
+    def files_of(workshop: Path) -> dict[str, str]:
         files = package.flight_files(controller, options)
         package.put(workshop, {**files, "test/replay.h": package.replay_header(controller, options, steps)})
         host = HostPackage(workshop, options.name)
@@ -106,7 +106,7 @@ def generate(
         files[package.MANIFEST] = package.manifest(files, about)
         return files
 
-    package.write(folder, build, force=force)
+    package.write(folder, files_of, force=force)
     return {**about, "warnings": warnings(mission, controller.scheme, real)}
 
 

@@ -118,7 +118,7 @@ def platform_folder() -> str:
     return f"{system}64"
 
 
-def build(files: dict[str, str], options: Options, workshop: Path, target: Path) -> None:
+def pack(files: dict[str, str], options: Options, workshop: Path, target: Path) -> None:
     """Compile the sources and write the archive.
 
     Raises

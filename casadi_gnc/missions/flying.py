@@ -68,7 +68,7 @@ def fly(
     if mode is not None and mode != mission.timing.mode:
         mission = mission.with_timing(mode=mode)
     chosen = mission.scheme(scheme)
-    built = tapes.build(mission, chosen)
+    built = tapes.tapes_of(mission, chosen)
     runner, notes = _engine(mission, chosen, built, engine, maths)
     carried = begin(mission, built, runner)
     total, chunk = mission.timing.samples, _CHUNK if built.symbolic else 200

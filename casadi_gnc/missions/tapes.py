@@ -80,7 +80,7 @@ def call(tape: ca.Function, places: Mapping[str, str]) -> str:
     return f"{tape.name()}({', '.join(places[name] for name in (*tape.name_in(), *tape.name_out()))})"
 
 
-def build(mission: Mission, scheme: Scheme) -> Tapes:
+def tapes_of(mission: Mission, scheme: Scheme) -> Tapes:
     """Return all tapes of a scheme in the mission's mode."""
     loop = Loop(mission, scheme)
     s, plant, timing, symbolic = loop.symbols(), mission.truth, mission.timing, scheme.actuation.is_symbolic

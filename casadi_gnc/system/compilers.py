@@ -31,9 +31,9 @@ __all__ = [
     "CACHE_VARIABLE",
     "Compiler",
     "available",
-    "build",
     "cache_folder",
     "compile_in",
+    "compiled",
     "different",
     "find",
     "load",
@@ -132,7 +132,7 @@ def find() -> Compiler:
     return found[0]
 
 
-def build(
+def compiled(
     source: str,
     *,
     include: Path,
@@ -232,17 +232,17 @@ def compile_in(shop: Path, compiler: Compiler, words: list[str], what: str) -> N
 
 
 def load(source: str, **options: Any) -> ctypes.CDLL:
-    """Return a built library, loaded; arguments as for `build`.
+    """Return a built library, loaded; arguments as for `compiled`.
 
     A cached file that cannot be loaded (cut short by a full disk, say) is built once more.
     """
-    path = build(source, **options)
+    path = compiled(source, **options)
     try:
         return ctypes.CDLL(str(path))
     except OSError:
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
-    return open_library(build(source, **options))
+    return open_library(compiled(source, **options))
 
 
 def open_library(path: Path) -> ctypes.CDLL:

@@ -33,7 +33,7 @@ def check_craft(mission: Mission) -> None:
     name = type(craft).__name__
     must(craft.__doc__, f"{name} has no docstring: catalogues show its first line")
     must(dict(craft.start()) == dict(craft.start()), f"{name}.start differs from call to call")
-    names = {signal for each in tapes.build(mission, scheme).row.names for signal in [each]}
+    names = {signal for each in tapes.tapes_of(mission, scheme).row.names for signal in [each]}
     for panel in craft.panels(mission):
         known = names | set(scheme.actuation.effort.names)
         must(panel.signal in known, f"{name}.panels shows {panel.signal!r}, which is not recorded")
@@ -68,7 +68,7 @@ def check_mission(mission: Mission) -> None:
 def _check_words(mission: Mission) -> None:
     """With the C library's functions the compiled C and CasADi's machine write the same words."""
     scheme = mission.scheme()
-    built, records = tapes.build(mission, scheme), []
+    built, records = tapes.tapes_of(mission, scheme), []
     compiled = CompiledEngine(mission, scheme, built, "libm", optimise="-O0")
     for engine in (compiled, VirtualMachineEngine(mission, scheme, built)):
         carried, record = begin(mission, built, engine), np.zeros((_SAMPLES, built.row.size))

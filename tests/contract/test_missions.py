@@ -18,7 +18,7 @@ SAMPLES = 40
 def test_engines_write_the_same_words(problem, scheme):
     """Every scheme of every mission, in its own mode, noise and faults included, with libm on both sides."""
     mission = missions()[problem].with_scheme(scheme)
-    built, chosen = tapes.build(mission, mission.schemes[0]), mission.schemes[0]
+    built, chosen = tapes.tapes_of(mission, mission.schemes[0]), mission.schemes[0]
     records = []
     for engine in (
         CompiledEngine(mission, chosen, built, "libm", optimise="-O0"),

@@ -78,7 +78,7 @@ def test_texts_stay_in_their_comments(attack, controller, tmp_path):
     package.put(tmp_path, files)
     mission = casadi_gnc.load("huang2020/slew")
     scheme = mission.scheme("pd_pinv")
-    flight = flight_source(dataclasses.replace(mission, name=ATTACKS[attack]), scheme, tapes.build(mission, scheme))
+    flight = flight_source(dataclasses.replace(mission, name=ATTACKS[attack]), scheme, tapes.tapes_of(mission, scheme))
     (tmp_path / "sources" / "flight.c").write_text(flight, encoding="utf-8")
     for source in ("craft.c", "fmu.c", "flight.c"):
         flags = ["-trigraphs", "-Wall", "-Wextra", "-Werror", "-I", str(assets.folder("codegen") / "runtime")]
