@@ -15,13 +15,6 @@ if TYPE_CHECKING:
     from casadi_gnc.problem_files.sweeping import Sweep
 
 
-class EngineChoice(str, Enum):
-    """Who computes."""
-
-    c = "c"
-    vm = "vm"
-
-
 class MathChoice(str, Enum):
     """Whose elementary functions."""
 
@@ -40,7 +33,7 @@ def fly(
     problem: Annotated[str, typer.Argument(help="A problem file, or the name of a shipped one.")],
     out: Annotated[Path | None, typer.Option(help="Folder for the results; out/<mission> if left out.")] = None,
     scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
-    engine: Annotated[EngineChoice, typer.Option(help="Compiled C, or CasADi's virtual machine.")] = EngineChoice.c,
+    engine: Annotated[str, typer.Option(help="c: compiled; vm: CasADi's virtual machine; or a package's own.")] = "c",
     math: Annotated[
         MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")
     ] = MathChoice.gnc,
@@ -60,7 +53,7 @@ def fly(
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)
     if sweeps := load_sweeps(problem):
-        options = {"engine": engine.value, "maths": math.value, "mode": mode.value if mode else None}
+        options = {"engine": engine, "maths": math.value, "mode": mode.value if mode else None}
         _fly_sweeps(mission, sweeps, list(dict.fromkeys(chosen)), folder, json, options)
         return
     flights, written = [], []
@@ -69,7 +62,7 @@ def fly(
         with _Progress(name, quiet=json) as progress:
             flights.append(
                 fly_one(
-                    mission, name, engine=engine.value, maths=math.value, mode=mode.value if mode else None,
+                    mission, name, engine=engine, maths=math.value, mode=mode.value if mode else None,
                     decimation=decimation, progress=progress,
                 )
             )  # fmt: skip
