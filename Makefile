@@ -1,24 +1,44 @@
-# make demo   fly the de-tumble mission; pictures and table in out/detumble
-# make test   style, types and the whole test suite
-# make bench  every solver that is installed, on the shipped sets; report in out/bench/allocation
-# make ratios every time and ratio that the documentation quotes, into docs/ratios.md
-# make gates  the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers
+# make demo     fly the de-tumble mission; pictures and table in out/detumble (the first time about a minute more, to
+#               install what it needs into .venv)
+# make test     style, types and the fast tests: about seven minutes on two cores
+# make test-all style, types and every test; needs clang, clang-tidy, cppcheck, g++ and `make targets`, and skips by
+#               name what a missing one prevents (with CI=true: fails)
+# make gates    the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers; needs
+#               clang, clang-tidy, cppcheck and g++
 # make targets  compilers and emulators of the flight targets (Debian packages; needs root)
-# Everything is installed into .venv here; needed beforehand: python3 (3.11 or newer, with venv), a
-# C compiler and make.
+# make test-oldest  the fast tests with the oldest packages that pyproject.toml allows, in .venv-oldest
+# make lock     the newest packages that pyproject.toml allows, into requirements.lock and requirements-dev.lock
+# make bench    every solver that is installed, on the shipped sets; report in out/bench/allocation
+# make ratios   every time and ratio that the documentation quotes, into docs/ratios.md
+# make docs     the documentation as a site, in docs/_build
+#
+# Needed beforehand: python3 (3.11 or newer, with venv), gcc with the headers of the C library, and make. Packages come
+# from the two lock files, each with its hash.
 
 PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test bench ratios gates targets pictures lint docs clean
+.PHONY: demo test test-all test-oldest lock bench ratios gates targets pictures lint docs clean
+
+# One BLAS thread a process: two processes share the cores.
+PYTEST := -m pytest -q -n 2
+test test-all test-oldest: export OPENBLAS_NUM_THREADS = 1
+# Tests that need more than the README asks for, and tests that take long, are in `make test-all` alone.
+FAST := -m 'not tools and not slow'
 
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
 
-# One BLAS thread a process: two processes share the cores.
 test: .venv/installed-dev lint
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2
+	$(BIN)/python $(PYTEST) $(FAST)
+
+test-all: .venv/installed-dev lint
+	$(BIN)/python $(PYTEST)
+
+# Old packages on new ones beneath them are told that they are old; that is no failure.
+test-oldest: .venv-oldest/installed
+	.venv-oldest/bin/python $(PYTEST) $(FAST) -W ignore::DeprecationWarning
 
 lint: .venv/installed-dev
 	$(BIN)/ruff check .
@@ -54,22 +74,44 @@ targets:
 gates:
 	$(PYTHON) tests/runtime/gates.py
 
-docs: .venv/installed-docs
+docs: .venv/installed-dev
 	$(BIN)/sphinx-build -W -q docs docs/_build
 
-.venv/installed: pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "casadi-gnc needs Python 3.11 or newer; make PYTHON=/path/to/python3.x")'
+PIP := -m pip --quiet --disable-pip-version-check install
+
+# The package itself is built by the back end from the lock, not by one that pip fetches for itself.
+.venv/installed: requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "casadi-gnc needs Python 3.11 or newer; make PYTHON=/path/to/python3.x")'
+	@echo "Installing what flying needs into .venv: 170 MB to fetch, half a minute on a fast connection; pip says nothing meanwhile."
 	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(BIN)/python $(PIP) --require-hashes --requirement requirements.lock
+	$(BIN)/python $(PIP) --no-deps --no-build-isolation --editable .
 	touch $@
 
-.venv/installed-dev: .venv/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+.venv/installed-dev: .venv/installed requirements-dev.lock
+	@echo "Installing what tests and documentation need into .venv: 200 MB more to fetch, half a minute on a fast connection."
+	$(BIN)/python $(PIP) --require-hashes --requirement requirements-dev.lock
 	touch $@
 
-.venv/installed-docs: .venv/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+# uv resolves for every system and Python at once; it reads settings of its own, not those of pip.
+UV := .venv-uv/bin/uv
+
+$(UV):
+	$(PYTHON) -m venv .venv-uv
+	.venv-uv/bin/python $(PIP) 'uv>=0.7'
+
+COMPILE := $(UV) pip compile --quiet --universal --generate-hashes --python-version 3.11 --upgrade \
+    --custom-compile-command 'make lock' --group build pyproject.toml
+
+lock: $(UV)
+	$(COMPILE) --extra dev --extra docs --output-file requirements-dev.lock
+	$(COMPILE) --constraints requirements-dev.lock --output-file requirements.lock
+
+.venv-oldest/installed: pyproject.toml | $(UV)
+	@echo "Installing the oldest packages that pyproject.toml allows into .venv-oldest: about a minute."
+	$(PYTHON) -m venv .venv-oldest
+	$(UV) pip install --quiet --python .venv-oldest/bin/python --resolution lowest-direct --group build --editable '.[dev]'
 	touch $@
 
 clean:
-	rm -rf .venv out docs/_build
+	rm -rf .venv .venv-oldest .venv-uv out docs/_build

@@ -53,7 +53,12 @@ class AllocationError(GncError):
 
 
 class LawError(GncError):
-    """Report a gain outside its range."""
+    """Report a gain outside its range, or a law, a plant or a craft whose method gives what cannot fly.
+
+    `scheme` is the name of the scheme that it is about, "" if it is about all.
+    """
+
+    scheme: str = ""
 
 
 class CheckError(GncError):

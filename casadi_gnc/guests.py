@@ -137,7 +137,7 @@ def run(file: GuestFile, place: Path | None = None) -> ModuleType:
     _KNOWN[file.module] = file
     try:
         exec(compile(file.text, shown, "exec"), vars(module))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[file.module]
         raise GuestError(f"{file.path} cannot be run: {told(error, shown)}{_hint(error, place)}") from error
     return module
@@ -154,7 +154,7 @@ class _Text(importlib.abc.InspectLoader):
         return self._file.text
 
 
-def _hint(error: Exception, place: Path | None) -> str:
+def _hint(error: BaseException, place: Path | None) -> str:
     missing = error.name if isinstance(error, ModuleNotFoundError) and place is not None else None
     if missing and place is not None and (place.parent / f"{missing}.py").is_file():
         return f"\n  {missing}.py lies beside it, but a guest is one file: move what it needs in there, or install it"
@@ -170,11 +170,15 @@ def told(error: BaseException, file: str = "") -> str:
     'ValueError: too small'
     """
     sentence = f"{type(error).__name__}: {error}".rstrip(": ")
+    return sentence + own_lines(error, file)
+
+
+def own_lines(error: BaseException, file: str = "") -> str:
+    """Return where in foreign code an exception came from: a line each, with what stands there."""
     if isinstance(error, SyntaxError):
-        return f"{sentence}\n  {file or error.filename}, line {error.lineno}: {(error.text or '').strip()}"
+        return f"\n  {file or error.filename}, line {error.lineno}: {(error.text or '').strip()}"
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if _theirs(frame.filename, file)]
-    lines = [f"\n  {frame.filename}, line {frame.lineno}, in {frame.name}: {frame.line}" for frame in frames]
-    return sentence + "".join(lines)
+    return "".join(f"\n  {frame.filename}, line {frame.lineno}, in {frame.name}: {frame.line}" for frame in frames)
 
 
 def _theirs(filename: str, file: str) -> bool:

@@ -20,7 +20,7 @@ def linearise() -> np.ndarray:
     """Return the poles of the sampled loop (in z) after a minute at rest under its disturbance."""
     mission = casadi_gnc.load("huang2020/detumble")
     loop = mission.closed_loop("observer_pinv")
-    calm = dataclasses.replace(mission, start=[0.0] * 6)
+    calm = dataclasses.replace(mission, start_from={"mrp": [0.0] * 3, "rate": [0.0] * 3})
     state = calm.loop_start("observer_pinv")
     for k in range(600):
         found = loop(t=k * mission.timing.sample_period, **state)

@@ -49,17 +49,8 @@ def detumble() -> casadi_gnc.Mission:
     return casadi_gnc.load("huang2020/detumble")
 
 
-def need_compiler(name: str) -> Compiler:
-    """Return a compiler by name; without it fail in CI and skip, by name, elsewhere."""
-    if shutil.which(name) is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail(f"CI needs the compiler {name}")
-        pytest.skip(f"the compiler {name} is not installed")
-    found = _probe((name,))
-    assert found is not None
-    return found
-
-
-@pytest.fixture(params=["gcc", "clang"])
+@pytest.fixture(params=["gcc", pytest.param("clang", marks=pytest.mark.tools("clang"))])
 def compiler(request: pytest.FixtureRequest) -> Compiler:
-    return need_compiler(request.param)
+    found = _probe((request.param,))
+    assert found is not None, f"{request.param} cannot be run"
+    return found

@@ -14,11 +14,11 @@ from itertools import pairwise
 from typing import Any, Literal
 
 import casadi as ca
-import jinja2
 import numpy as np
 
 from casadi_gnc.embedded.printer import Math, Real, print_function
 from casadi_gnc.system import assets, compilers
+from casadi_gnc.system.templates import template
 
 Way = Callable[[np.ndarray], np.ndarray]
 #: Flags as for flights.
@@ -129,7 +129,7 @@ def casadi_c_way(function: ca.Function) -> Way:
     """Return CasADi's own C, compiled with the same flags and called through CasADi's buffers."""
     generator = ca.CodeGenerator(function.name())
     generator.add(function)
-    path = compilers.build(generator.dump(), include=assets.folder("codegen") / "runtime", flags=_FLAGS)
+    path = compilers.compiled(generator.dump(), include=assets.folder("codegen") / "runtime", flags=_FLAGS)
     return buffer_way(ca.external(function.name(), str(path)))
 
 
@@ -151,14 +151,8 @@ def c_way(function: ca.Function, real: Real, maths: Math, times: int = 1, entry:
 
 def _library(function: ca.Function, real: Real, maths: Math) -> ctypes.CDLL:
     folder = assets.folder("codegen")
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(folder / "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
     inputs, outputs = _starts(function, "in"), _starts(function, "out")
-    source = environment.get_template("benchmark_step.c.j2").render(
+    source = template("benchmark_step.c.j2").render(
         title=function.name(),
         name=function.name(),
         real=real,

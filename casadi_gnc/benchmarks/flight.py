@@ -17,8 +17,9 @@ from casadi_gnc.benchmarks.contest import Accuracy, Family, Judgement, digest
 from casadi_gnc.benchmarks.machine import version
 from casadi_gnc.errors import BenchmarkError, NoCompilerError
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine, VirtualMachineEngine
+from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files.loading import load
 from casadi_gnc.system import compilers
@@ -87,7 +88,7 @@ def _family(problem: str, samples: int | None) -> Family:
     whole = min(DURATION, mission.timing.duration)
     count = max(min(samples or 10**9, int(whole / mission.timing.sample_period) + 1), 2)
     mission = _shortened(name, count)
-    built = tapes.build(mission, scheme)
+    built = tapes.tapes_of(mission, scheme)
     record = np.zeros((count, built.row.size))
     carried = _flown(VirtualMachineEngine(mission, scheme, built), mission, built, record)
     end = carried.x.copy()
@@ -132,7 +133,7 @@ class FlightRunner:
             self._run = _folded(mission, loop)
             return
         scheme = mission.scheme(loop.scheme)
-        built = tapes.build(mission, scheme)
+        built = tapes.tapes_of(mission, scheme)
         made: Engine
         if engine == "vm":
             made = VirtualMachineEngine(mission, scheme, built)

@@ -10,6 +10,7 @@ from casadi_gnc.benchmarks.results import Results
 from casadi_gnc.benchmarks.running import APPENDIX, left_out
 from casadi_gnc.benchmarks.statistics import Ratio
 from casadi_gnc.benchmarks.summary import Overview, alike, groups, lost
+from casadi_gnc.system.text import markdown
 
 CLOCKS = {"wall": "times by the wall clock", "cpu": "processor times, in which waiting counts nothing"}
 #: What each column of the tables is, for the report.
@@ -30,13 +31,16 @@ def as_markdown(found: Overview, pictures: list[Path]) -> str:
     """Return the report's text."""
     results = found.results
     header = results.header
-    parts = [f"# {header['title']}", _conditions(header), *_warnings(results)]
+    parts = [f"# {markdown(header['title'])}", _conditions(header), *_warnings(results)]
     for group, order in found.orders.items():
         if not order:
             parts += [f"## {group}", "No contestant has been measured on every family of this set yet."]
             continue
         names = groups(results)[group]
-        parts += [f"## {group}", "\n".join(f"* `{name}`: {header['families'][name]['title']}" for name in names)]
+        parts += [
+            f"## {group}",
+            "\n".join(f"* `{name}`: {markdown(header['families'][name]['title'])}" for name in names),
+        ]
         parts += [ranking_table(order, found.whole(group)), _differences(order)]
         if header["contest"] == "flight":
             parts.append(_rates(found.whole(group)))
@@ -51,7 +55,10 @@ def as_markdown(found: Overview, pictures: list[Path]) -> str:
     parts += ["## Known limitations", "\n".join(f"* {text}" for text in [*header["limitations"], *_common(header)])]
     failures = lost(list(results.cells.values()))
     if failures:
-        parts += ["## Solves without an answer", "\n".join(f"* {count} times {why}" for why, count in failures.items())]
+        parts += [
+            "## Solves without an answer",
+            "\n".join(f"* {count} times {markdown(why)}" for why, count in failures.items()),
+        ]
     if header["absent"]:
         parts += ["## Not installed", "\n".join(f"* {text}" for text in header["absent"])]
     return "\n\n".join(parts) + "\n"

@@ -11,6 +11,7 @@ from casadi_gnc.benchmarks.results import Results
 from casadi_gnc.benchmarks.statistics import charged, performance_profile
 from casadi_gnc.benchmarks.summary import contestants_of, groups, timings
 from casadi_gnc.system.files import write_beside
+from casadi_gnc.system.text import picture
 
 #: Okabe and Ito's colours, told apart with every kind of colour vision; beyond seven the line's style changes.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -38,7 +39,9 @@ def plot_group(results: Results, group: str, folder: Path) -> Path:
     _profile(left, times, limit)
     _spread(right, times, limit)
     figure.suptitle(
-        f"{results.header['title']}: {group}, accuracy {results.header['settings']['accuracy']}", ha="left", x=0.02
+        picture(f"{results.header['title']}: {group}, accuracy {results.header['settings']['accuracy']}"),
+        ha="left",
+        x=0.02,
     )
     target = folder / f"{group}.svg"
     with rc_context({"svg.hashsalt": group}):  # the same picture is the same file

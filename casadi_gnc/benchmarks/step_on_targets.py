@@ -11,6 +11,7 @@ from typing import Any
 
 from casadi_gnc.benchmarks.contest import Family
 from casadi_gnc.delivery import packaging
+from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import targets
 from casadi_gnc.errors import GncError
 
@@ -21,7 +22,7 @@ _REALS = ("float64", "float32")
 
 def table(families: list[Family]) -> str:
     """Return the counts as a table in Markdown, or a sentence that says what is missing."""
-    boards = [targets.find(name) for name in targets.names()]
+    boards = [known_boards.find(name) for name in known_boards.names()]
     ready = [board for board in boards if not board.missing()]
     lacking = [f"{board.name} needs {' and '.join(board.missing())}" for board in boards if board.missing()]
     lines = ["## Instructions on targets", ""]
@@ -38,7 +39,7 @@ def table(families: list[Family]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _counts(family: Family, real: str, boards: list[targets.Target]) -> list[dict[str, Any]]:
+def _counts(family: Family, real: str, boards: list[known_boards.Target]) -> list[dict[str, Any]]:
     found = []
     with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
         folder, given = Path(workshop) / "package", family.data

@@ -18,8 +18,8 @@ import numpy as np
 
 from casadi_gnc.checking.linear import target_state
 from casadi_gnc.checks import Check
-from casadi_gnc.missions.loop import funnel_signals
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.missions.scheme import Funnel, Scheme
 
 #: A signal is moved directly by what changes its rate by so much.

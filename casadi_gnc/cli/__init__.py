@@ -1,1 +1,3 @@
 """Commands: parse, call, print."""
+
+__all__: list[str] = []

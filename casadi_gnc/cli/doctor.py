@@ -40,10 +40,24 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] 
         typer.echo("missing    nothing")
 
 
+def _names_in_the_way() -> list[str]:
+    """Return a sentence for each name that an installed package offers in vain."""
+    from casadi_gnc import laws
+    from casadi_gnc.allocation import backends
+    from casadi_gnc.embedded import boards
+    from casadi_gnc.missions import checks, craft, engines
+    from casadi_gnc.problem_files import synthesis_recipes
+    from casadi_gnc.synthesis import backends as lmi_backends
+
+    registries = [laws.REGISTRY, craft.REGISTRY, checks.REGISTRY, engines.REGISTRY, boards.REGISTRY]
+    registries += [backends.REGISTRY, lmi_backends.REGISTRY, synthesis_recipes.REGISTRY]
+    return [sentence for each in registries for sentence in each.problems()]
+
+
 def examine() -> dict[str, Any]:
     """Return what the doctor finds, as plain data."""
     from casadi_gnc.allocation import backends
-    from casadi_gnc.embedded import targets
+    from casadi_gnc.embedded import boards
     from casadi_gnc.system import compilers
 
     packages, missing = {}, []
@@ -62,6 +76,7 @@ def examine() -> dict[str, Any]:
         missing.append(
             {"what": "C compiler", "cost": "flights run on CasADi's virtual machine, some hundred times slower"}
         )
+    missing += [{"what": "a name", "cost": sentence} for sentence in _names_in_the_way()]
     folder = compilers.cache_folder()
     libraries = len(list(folder.glob("*.so")) + list(folder.glob("*.dll"))) if folder.is_dir() else 0
     return {
@@ -71,7 +86,7 @@ def examine() -> dict[str, Any]:
         "packages": packages,
         "compilers": [{"command": " ".join(c.command), "version": c.version} for c in found],
         "solvers": backends.available(),
-        "targets": {name: targets.find(name).missing() for name in targets.names()},
+        "targets": {name: boards.find(name).missing() for name in boards.names()},
         "cache": {"folder": str(folder), "libraries": libraries},
         "missing": missing,
     }

@@ -45,14 +45,12 @@ def fly(
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
     """Fly a mission and write <scheme>.npz, summary.json and pictures; of one with sweeps summary.json alone."""
-    from casadi_gnc.missions import engines
     from casadi_gnc.missions import flight as results
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.problem_files.sweeping import load_sweeps
     from casadi_gnc.system.files import prepare_folder
 
-    engines.REGISTRY.find(engine)  # a name that leads nowhere is told before anything is made
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)

@@ -39,13 +39,14 @@ def generate(
 ) -> None:
     """Write the controller as C that an embedded project takes as it is, with a flight to test it by."""
     from casadi_gnc.delivery import packaging
+    from casadi_gnc.system.text import shell, terminal
 
     gains, boards = _words(tunable), _words(target)
     if format is FormatChoice.fmu:
         from casadi_gnc.delivery.fmu import generate_fmu
 
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains)
-        typer.echo(f"wrote {written}")
+        typer.echo(terminal(f"wrote {written}"))
         return
     folder = Path("flight") / (name or Path(problem).stem) if out is None else out
     about = packaging.generate(
@@ -59,10 +60,10 @@ def generate(
         steps=steps,
         force=force,
     )
-    typer.echo(f"{about['title']}, scheme {about['scheme']}, {about['real']}: wrote {folder}")
+    typer.echo(terminal(f"{about['title']}, scheme {about['scheme']}, {about['real']}: wrote {folder}"))
     for warning in about["warnings"]:
-        typer.echo(f"warning: {warning}")
-    typer.echo(f"next: make -C {folder} test; casadi-gnc verify {folder} --target host,cortex-m7")
+        typer.echo(terminal(f"warning: {warning}"))
+    typer.echo(f"next: make -C {shell(folder)} test; casadi-gnc verify {shell(folder)} --target host,cortex-m7")
 
 
 def _words(text: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 
@@ -52,6 +53,10 @@ app.command("doctor")(doctor.doctor)
 
 def main() -> None:
     """Run the command line; turn what a user can put right into one sentence on stderr."""
+    # A terminal that lacks a letter gets its number, not a traceback.
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     _say_what_code_runs()
     try:
         app()
@@ -65,7 +70,8 @@ def main() -> None:
         sys.exit(0)
     except OSError as error:
         _silence()
-        _end(f"casadi-gnc: cannot write the output: {error.strerror or error}", 2)
+        what = f"the output {error.filename!r}" if error.filename else "the output"
+        _end(f"casadi-gnc: cannot write {what}: {error.strerror or error}", 2)
 
 
 def _say_what_code_runs() -> None:
@@ -80,7 +86,9 @@ def _say_what_code_runs() -> None:
 
 
 def _end(sentence: str, code: int) -> None:
-    print(sentence, file=sys.stderr)  # noqa: T201
+    from casadi_gnc.system.text import terminal
+
+    print(terminal(sentence), file=sys.stderr)  # noqa: T201
     sys.exit(code)
 
 

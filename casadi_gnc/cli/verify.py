@@ -18,11 +18,11 @@ def verify(
 ) -> None:
     """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs."""
     from casadi_gnc.delivery.verifying import verify as run
-    from casadi_gnc.embedded import targets
+    from casadi_gnc.embedded import boards
 
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
     if "all" in wanted:
-        wanted = ["host", *targets.names()]
+        wanted = ["host", *boards.names()]
     found = run(package, wanted)
     if report is not None:
         _write(report, found)
@@ -47,30 +47,37 @@ def _write(path: Path, found: dict[str, Any]) -> None:
 
 
 def _print(found: dict[str, Any]) -> None:
-    typer.echo(f"{found['title']}, scheme {found['scheme']}, {found['real']}, {found['steps']} samples")
+    _say(f"{found['title']}, scheme {found['scheme']}, {found['real']}, {found['steps']} samples")
     for one in found["comparisons"]:
         verdict = f"{one['words']} of {one['of']} words differ"
-        typer.echo(f"  {one['what']}: {verdict}{'' if one['exact'] else ' (as they must between types)'}")
+        _say(f"  {one['what']}: {verdict}{'' if one['exact'] else ' (as they must between types)'}")
         for signal in one["signals"]:
             if signal["words"]:
-                typer.echo(
+                _say(
                     f"    {signal['signal']}: {signal['words']} words, at most {signal['absolute']:.3g} "
                     f"{signal['unit']}".rstrip()
                     + f", {signal['relative']:.2g} of the largest, {signal['ulp']:.3g} ulp"
                 )
     for row in found["targets"]:
-        typer.echo(
+        _say(
             f"  {row['target']}: {row['instructions_median']} instructions a step (worst {row['instructions_worst']}), "
             f"{row['text_bytes']} B code, {row['data_bytes'] + row['bss_bytes']} B static data, "
             f"{row['stack_step_bytes']} B stack"
         )
     for name, tools in found["not_installed"].items():
-        typer.echo(f"  {name}: not installed here ({', '.join(tools)}); make targets installs it")
+        _say(f"  {name}: not installed here ({', '.join(tools)}); make targets installs it")
     for warning in found["warnings"]:
-        typer.echo(f"  warning: {warning}")
+        _say(f"  warning: {warning}")
     for what, names in (
         ("edited since it was generated", "edited"),
         ("this version writes otherwise", "not_regenerated"),
     ):
         if found[names]:
-            typer.echo(f"  {what}: {', '.join(found[names])}")
+            _say(f"  {what}: {', '.join(found[names])}")
+
+
+def _say(text: str) -> None:
+    """Print what may hold texts of a package that somebody else made."""
+    from casadi_gnc.system.text import terminal
+
+    typer.echo(terminal(text))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -15,6 +14,7 @@ from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.onboard import describe, sampled
 from casadi_gnc.problem_files.by_name import mission_of
 from casadi_gnc.system.files import prepare_folder, write_beside
+from casadi_gnc.system.folders import workshop
 
 
 def generate_fmu(
@@ -49,6 +49,6 @@ def generate_fmu(
     controller = describe(mission, scheme, tunable)
     files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration)
     prepare_folder(target.parent)
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        write_beside(target, lambda place: fmu.build(files, options, Path(workshop), place))
+    with workshop() as shop:
+        write_beside(target, lambda place: fmu.pack(files, options, shop, place))
     return target

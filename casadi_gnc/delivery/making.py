@@ -15,8 +15,9 @@ from casadi_gnc import guests
 from casadi_gnc.embedded import package, saving
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.errors import GncError, PackageError
-from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.onboard import describe, sampled
+from casadi_gnc.missions.origin import Origin
 from casadi_gnc.problem_files.document import Document, parsed
 from casadi_gnc.problem_files.loading import load, load_document
 
@@ -37,7 +38,7 @@ def kept(
         about = {"made_of": "objects", "sha256": mission.digest}
         return {CONTROLLER: saving.to_text(controller)}, about
     taken = {file.path: file.text for file in origin.guests}
-    about = {"file": origin.name, "sha256": origin.digest}
+    about: dict[str, Any] = {"file": origin.name, "sha256": origin.digest}
     if origin.changes:
         about["changes"] = dict(origin.changes)
     if origin.guests:

@@ -10,6 +10,7 @@ from typing import Any
 from casadi_gnc.checking import numbers
 from casadi_gnc.delivery import making
 from casadi_gnc.delivery.vectors import fly_package
+from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import package, targets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
@@ -65,7 +66,7 @@ def generate(
     if steps > MOST_STEPS:
         raise PackageError(f"steps is {steps}, expected at most {MOST_STEPS}: vectors are text in the package")
     options = Options(mission.name if name is None else name, REALS[real])  # type: ignore[arg-type]
-    boards = [targets.find(one) for one in dict.fromkeys(target)]
+    boards = [known_boards.find(one) for one in dict.fromkeys(target)]
     for board in boards:
         board.need()
     package.check_room(folder, force)
@@ -84,7 +85,7 @@ def generate(
         "made_by": {"casadi_gnc": metadata.version("casadi-gnc"), "casadi": metadata.version("casadi")},
     }
 
-    def build(workshop: Path) -> dict[str, str]:
+    def files_of(workshop: Path) -> dict[str, str]:
         files = package.flight_files(controller, options)
         package.put(workshop, {**files, "test/replay.h": package.replay_header(controller, options, steps)})
         host = HostPackage(workshop, options.name)
@@ -105,7 +106,7 @@ def generate(
         files[package.MANIFEST] = package.manifest(files, about)
         return files
 
-    package.write(folder, build, force=force)
+    package.write(folder, files_of, force=force)
     return {**about, "warnings": warnings(mission, controller.scheme, real)}
 
 

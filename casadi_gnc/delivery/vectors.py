@@ -27,7 +27,7 @@ class CompiledPlant:
     """Measure and move a mission's plant in compiled C."""
 
     def __init__(self, mission: Mission, scheme: Scheme) -> None:
-        built = tapes.build(mission, scheme)
+        built = tapes.tapes_of(mission, scheme)
         names = [name for name in ("sense", "draw", "plant", "settle") if name in built.functions]
         text = ['#include "gnc_math.h"', "typedef double gnc_real;"]
         for name in names:

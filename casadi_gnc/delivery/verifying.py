@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -12,12 +11,16 @@ import numpy as np
 
 from casadi_gnc.delivery import making
 from casadi_gnc.delivery.packaging import REALS, warnings
+from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import compare, package, targets
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.machine import Machine
 from casadi_gnc.errors import PackageError
 from casadi_gnc.system import compilers
+
+#: What a manifest must say for a package to be verified.
+_ABOUT = {"name": str, "title": str, "scheme": str, "real": str, "tunable": list}
 
 
 def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, Any]:
@@ -41,7 +44,11 @@ def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, A
     """
     folder = Path(folder)
     about = package.read_manifest(folder)
-    boards = [targets.find(one) for one in dict.fromkeys(target) if one != "host"]
+    if lacking := [key for key, kind in _ABOUT.items() if not isinstance(about.get(key), kind)]:
+        raise PackageError(f"{folder} is no package: its {package.MANIFEST} does not say {', '.join(lacking)}")
+    if about["real"] not in REALS:
+        raise PackageError(f"{folder} is no package of this version: its numbers are {about['real']!r}")
+    boards = [known_boards.find(one) for one in dict.fromkeys(target) if one != "host"]
     for board in boards:
         board.need()
     inputs, outputs = read_vectors(folder, about["real"])
@@ -52,7 +59,7 @@ def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, A
     report["warnings"] = warnings(mission, controller.scheme, about["real"])
     report["not_regenerated"] = _changed(folder, package.flight_files(controller, options))
     report["comparisons"], report["targets"] = [], []
-    every = [targets.find(one) for one in targets.names()]
+    every = [known_boards.find(one) for one in known_boards.names()]
     report["not_installed"] = {one.name: one.missing() for one in every if one.missing()}
     if "host" in target:
         report["comparisons"] += _on_host(folder, controller, options, inputs, outputs)
@@ -106,7 +113,7 @@ def _on_host(
     folder: Path, controller: Controller, options: Options, inputs: np.ndarray, outputs: np.ndarray
 ) -> list[dict[str, Any]]:
     found = []
-    for compiler in _different(compilers.available() or [compilers.find()]):
+    for compiler in compilers.different(compilers.available() or [compilers.find()]):
         replayed = HostPackage(folder, options.name, compiler=compiler).replay(inputs, outputs.shape[1])
         lines = compare.differences(replayed, outputs, controller.outputs)
         found.append(_comparison(f"host, {compiler.version}, against the shipped flight", lines, exact=True))
@@ -127,15 +134,9 @@ def _on_host(
     return found
 
 
-def _different(found: list[compilers.Compiler]) -> list[compilers.Compiler]:
-    """Return compilers of different versions."""
-    return list({compiler.version: compiler for compiler in reversed(found)}.values())[::-1]
-
-
 def _rebuilt(controller: Controller, options: Options, inputs: np.ndarray, flags: tuple[str, ...]) -> np.ndarray:
     """Return the output words of the controller made anew with other options."""
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        folder = Path(workshop)
+    with compilers.workshop() as folder:
         files = package.flight_files(controller, options)
         files["test/replay.h"] = package.replay_header(controller, options, len(inputs))
         package.put(folder, files)

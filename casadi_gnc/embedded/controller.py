@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from casadi_gnc.allocation.problem import AllocationProblem
-from casadi_gnc.embedded.names import check_name
+from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.embedded.printer import Math, Real, c_constant
 from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout
@@ -49,7 +49,7 @@ class Options:
     maths: Math = "gnc"
 
     def __post_init__(self) -> None:
-        check_name(self.name)
+        check_package(self.name)
 
     def constant(self, value: float) -> str:
         """Return a number as C of this type."""
@@ -110,7 +110,7 @@ class Controller:
             for name in layout.names:
                 check_name(name, "signal")
         for tunable in self.tunables:
-            check_name(tunable.name, "parameter")
+            check_parameter(tunable.name)
         if "time" in self.measured or "status" in self.outputs:
             raise PackageError("time and status are taken: a signal needs another name")
         for tape in self.tapes.values():

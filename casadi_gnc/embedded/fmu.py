@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import platform
-import subprocess
 import sys
 import zipfile
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.host import FLAGS
 from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.package import flight_files, put
-from casadi_gnc.embedded.source import access_tunable, environment
-from casadi_gnc.errors import CompilerError, PackageError
+from casadi_gnc.embedded.source import access_tunable
+from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout
-from casadi_gnc.system import assets, compilers
+from casadi_gnc.system import compilers
+from casadi_gnc.system.templates import template
 
 #: A date for every file of the archive: the same unit has the same bytes on another day.
 _DATE = (1980, 1, 1, 0, 0, 0)
@@ -31,9 +29,9 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
     sources = {path: text for path, text in package.items() if path.endswith((".c", ".h"))}
     guid = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32]
     parameters = [place for one in controller.tunables for place in access_tunable(one, "")]
-    wrapper = environment().get_template("fmu.c.j2").render(
+    wrapper = template("fmu.c.j2").render(
         name=options.name,
-        title=controller.title.replace("*/", "* /"),
+        title=controller.title,
         guid=guid,
         period=f"{controller.period:g}",
         period_double=Options(options.name).constant(controller.period),
@@ -41,7 +39,7 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
         outputs=access(controller.outputs, "output."),
         parameters=parameters,
     )  # fmt: skip
-    xml = _xml().render(
+    xml = template("fmu.xml.j2").render(
         name=options.name,
         title=controller.title,
         description=f"scheme {controller.scheme}{', ' + controller.source if controller.source else ''}",
@@ -55,14 +53,6 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
     )
     files = {f"sources/{path}": text for path, text in {"fmu.c": wrapper, **sources}.items()}
     return {"modelDescription.xml": xml, **files, "documentation/LICENSE": package["LICENSE"]}
-
-
-def _xml() -> jinja2.Template:
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
-        undefined=jinja2.StrictUndefined,
-        autoescape=True,
-    ).get_template("fmu.xml.j2")
 
 
 def _variables(controller: Controller) -> list[dict[str, Any]]:
@@ -80,6 +70,11 @@ def _variables(controller: Controller) -> list[dict[str, Any]]:
         )
         for name, value in zip(layout_names, one.default, strict=True):
             rows.append(_variable(name, "parameter", "tunable", one.note, one.unit, "Real", repr(value)))
+    names = [row["name"] for row in rows]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise PackageError(
+            f"the unit would have two variables {twice[0]!r}, as input, output or parameter; rename one of the signals"
+        )
     for i, row in enumerate(rows, 1):
         row["index"] = i
     return rows
@@ -101,11 +96,11 @@ def _variable(
         "name": name,
         "causality": causality,
         "variability": variability,
-        "initial": "exact" if causality != "input" else "",
+        "initial": {"input": "", "output": "calculated"}.get(causality, "exact"),
         "description": note,
         "unit": "" if unit == "-" else unit,
         "type": kind,
-        "start": start,
+        "start": None if causality == "output" else start,
         "low": None,
         "high": None,
     }
@@ -123,7 +118,7 @@ def platform_folder() -> str:
     return f"{system}64"
 
 
-def build(files: dict[str, str], options: Options, workshop: Path, target: Path) -> None:
+def pack(files: dict[str, str], options: Options, workshop: Path, target: Path) -> None:
     """Compile the sources and write the archive.
 
     Raises
@@ -136,22 +131,9 @@ def build(files: dict[str, str], options: Options, workshop: Path, target: Path)
     library = workshop / "binaries" / folder / f"{options.name}{'.dll' if folder == 'win64' else '.so'}"
     library.parent.mkdir(parents=True)
     sources = [str(path) for path in sorted((workshop / "sources").glob("*.c"))]
-    hidden = ["-fPIC", "-shared", "-fvisibility=hidden"]
-    command = [
-        *compiler.command,
-        *FLAGS,
-        "-O2",
-        *hidden,
-        f"-I{workshop / 'sources'}",
-        "-o",
-        str(library),
-        *sources,
-        "-lm",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    if done.returncode:
-        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
-        raise CompilerError(f"{compiler.name} refused the unit: {complaint.strip()}")
+    include = f"-I{workshop / 'sources'}"
+    words = [*FLAGS, "-O2", "-fPIC", "-shared", "-fvisibility=hidden", include, "-o", str(library), *sources, "-lm"]
+    compilers.compile_in(workshop, compiler, words, "the unit")
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for path in sorted(path for path in workshop.rglob("*") if path.is_file()):
             entry = zipfile.ZipInfo(path.relative_to(workshop).as_posix(), _DATE)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import subprocess
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -44,24 +42,12 @@ class HostPackage:
         self.compiler = compiler or compilers.find()
         binding = assets.folder("codegen") / "targets" / "binding.c"
         sources = [binding, *units(folder, name)]
-        with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-            library = Path(workshop) / "package.so"
-            command = [
-                *self.compiler.command,
-                *FLAGS,
-                *flags,
-                "-fPIC",
-                "-shared",
-                f"-I{folder}",
-                f"-I{folder / 'test'}",
-            ]
-            done = subprocess.run(
-                [*command, "-o", str(library), *map(str, sources), "-lm"], capture_output=True, text=True, timeout=600
-            )
-            if done.returncode:
-                complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
-                raise CompilerError(f"{self.compiler.name} refused the package: {complaint.strip()}")
-            self._c = ctypes.CDLL(str(library))  # stays loaded when the file goes
+        with compilers.workshop() as shop:
+            library = shop / "package.so"
+            include = [f"-I{folder}", f"-I{folder / 'test'}"]
+            words = [*FLAGS, *flags, "-fPIC", "-shared", *include, "-o", str(library), *map(str, sources), "-lm"]
+            compilers.compile_in(shop, self.compiler, words, "the package")
+            self._c = compilers.open_library(library)  # stays loaded when the file goes
         self._c.binding_size.restype = ctypes.c_long
         self.state_size, self.params_size, word = (int(self._c.binding_size(i)) for i in range(3))
         self.word = np.dtype(np.uint64 if word == 8 else np.uint32)

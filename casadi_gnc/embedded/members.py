@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from casadi_gnc.embedded.controller import Controller, Tunable
 from casadi_gnc.signals import Layout, Signal
@@ -47,7 +46,7 @@ def members(layout: Layout, notes: dict[str, str] | None = None) -> list[dict[st
             parts.append(notes[signal.name])
         elif signal.limit < math.inf:
             parts.append(f"up to {signal.limit:g} in magnitude")
-        rows.append({"declaration": declaration(signal), "note": _comment(", ".join(parts))})
+        rows.append({"declaration": declaration(signal), "note": ", ".join(parts)})
     return rows
 
 
@@ -76,7 +75,7 @@ def tunable_members(controller: Controller) -> list[dict[str, str]]:
             if one.minimum is not None
             else ""
         )
-        rows.append({"declaration": declaration(one), "note": _comment(f"{one.unit or '-'}{bound}; {one.note}")})
+        rows.append({"declaration": declaration(one), "note": f"{one.unit or '-'}{bound}; {one.note}"})
     return rows
 
 
@@ -90,8 +89,3 @@ def _ranges(layout: Layout, lower: tuple[float, ...], upper: tuple[float, ...]) 
         else:
             ranges[signal.name] = "; ".join(f"{a:g} to {b:g}" for a, b in zip(low, high, strict=True))
     return ranges
-
-
-def _comment(text: Any) -> str:
-    """Return a text that cannot end a C comment."""
-    return str(text).replace("*/", "* /").replace("/*", "/ *").replace("\n", " ")

@@ -19,9 +19,10 @@ import numpy as np
 
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.members import access
-from casadi_gnc.embedded.source import allocator_files, environment, render_header, render_source, runtime_files
+from casadi_gnc.embedded.source import allocator_files, render_header, render_source, runtime_files
 from casadi_gnc.errors import OutputError, PackageError
 from casadi_gnc.system import assets
+from casadi_gnc.system.templates import template
 
 #: Where a package's own Makefile and CMake build; never looked at.
 BUILD = "build"
@@ -41,7 +42,7 @@ def flight_files(controller: Controller, options: Options) -> dict[str, str]:
 
 def replay_header(controller: Controller, options: Options, steps: int) -> str:
     """Return `test/replay.h`, which names the words of inputs and outputs."""
-    return environment().get_template("package_replay.h.j2").render(
+    return template("package_replay.h.j2").render(
         name=options.name,
         bits=64 if options.real == "double" else 32,
         steps=steps,
@@ -54,16 +55,15 @@ def replay_files(
     controller: Controller, options: Options, inputs: np.ndarray, outputs: np.ndarray, spoiled: int
 ) -> dict[str, str]:
     """Return the replay program, its vectors (rows of words) and the files that build it."""
-    render = environment().get_template
     units = [f"{options.name}.c", *allocator_files(controller, options)]
-    about = {"name": options.name, "units": units}
+    about = {"name": options.name, "units": units, "bits": 64 if options.real == "double" else 32}
     vectors = {"inputs": _rows(inputs), "outputs": _rows(outputs), "steps": len(inputs), "spoiled": spoiled}
     return {
         "test/replay.h": replay_header(controller, options, len(inputs)),
-        "test/replay.c": render("package_replay.c.j2").render(**about),
-        "test/vectors.c": render("package_vectors.c.j2").render(**about, **vectors),
-        "Makefile": render("package_makefile.j2").render(**about),
-        "CMakeLists.txt": render("package_cmake.j2").render(**about),
+        "test/replay.c": template("package_replay.c.j2").render(**about),
+        "test/vectors.c": template("package_vectors.c.j2").render(**about, **vectors),
+        "Makefile": template("package_makefile.j2").render(**about),
+        "CMakeLists.txt": template("package_cmake.j2").render(**about),
     }
 
 

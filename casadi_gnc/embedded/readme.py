@@ -6,12 +6,12 @@ from typing import Any
 
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.members import members, output_members, tunable_members
-from casadi_gnc.embedded.source import environment
+from casadi_gnc.system.templates import template
 
 
 def render_usage(controller: Controller, options: Options) -> str:
     """Return the C of a caller; the functions that read sensors and drive actuators are the user's."""
-    return environment().get_template("package_usage.c.j2").render(
+    return template("package_usage.c.j2").render(
         name=options.name,
         NAME=options.name.upper(),
         measured=[{"name": one.name, "size": one.size} for one in controller.measured.signals],
@@ -37,7 +37,7 @@ def render_readme(
     rows = tunable_members(controller)
     for row, one in zip(rows, controller.tunables, strict=True):
         row["default"] = ", ".join(f"{value:g}" for value in one.default)
-    return environment().get_template("package_readme.md.j2").render(
+    return template("package_readme.md.j2").render(
         name=options.name,
         NAME=options.name.upper(),
         title=controller.title,

@@ -4,17 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import jinja2
-
-from casadi_gnc.system import assets
+from casadi_gnc.system.templates import template
 
 
 def render_report(found: dict[str, Any]) -> str:
     """Return the page of what `verify` returned."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=True,
-    )
-    return environment.get_template("package_report.html.j2").render(found=found)
+    return template("package_report.html.j2").render(found=found)

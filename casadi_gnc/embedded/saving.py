@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict
+from importlib import metadata
 from typing import Any
 
 import casadi as ca
@@ -34,7 +35,7 @@ def to_text(controller: Controller) -> str:
     content["statuses"] = [[bit, name, sentence] for bit, (name, sentence) in controller.statuses.items()]
     content["tunables"] = [asdict(one) for one in controller.tunables]
     content["allocation"] = None if controller.allocation is None else _problem(controller.allocation)
-    return json.dumps({"format": _FORMAT, "casadi": ca.__version__, **content}, indent=1) + "\n"
+    return json.dumps({"format": _FORMAT, "casadi": metadata.version("casadi"), **content}, indent=1) + "\n"
 
 
 def from_text(text: str) -> Controller:

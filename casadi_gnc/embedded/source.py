@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import jinja2
-
 from casadi_gnc.allocation import online
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded.controller import Controller, Options
@@ -19,6 +17,7 @@ from casadi_gnc.embedded.members import (
 )
 from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.system import assets
+from casadi_gnc.system.templates import template
 
 #: Objects that a tape may read or write, with their C declarations ({name}: prefix of the package).
 _OBJECTS = {
@@ -39,21 +38,11 @@ _NOTES = {
 }
 
 
-def environment() -> jinja2.Environment:
-    """Return the templates of `codegen/`."""
-    return jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
-        undefined=jinja2.StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-
-
 def runtime_files(controller: Controller, options: Options) -> list[str]:
     """Return the files of `codegen/runtime` that the package carries."""
-    maths = (
-        [] if options.maths == "libm" else ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
-    )
+    maths = ["gnc_arithmetic.h"]
+    if options.maths == "gnc":
+        maths += ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
     if controller.allocation is None:
         return maths
     return [*maths, "gnc_allocate.h", "gnc_allocate_internal.h"]
@@ -69,7 +58,7 @@ def render_header(controller: Controller, options: Options) -> str:
     }
     state = {"memory": members(controller.memory), "good": members(controller.measured)}
     state["previous"] = members(controller.actuators)
-    return environment().get_template("package_header.h.j2").render(
+    return template("package_header.h.j2").render(
         **_common(controller, options),
         period=options.constant(controller.period),
         sizes=[{"name": name, "value": value} for name, value in sizes.items()],
@@ -99,7 +88,7 @@ def render_source(controller: Controller, options: Options) -> str:
         tapes.append({"text": text, "note": _NOTES[name]})
         calls[name] = call
     reads = controller.allocation is not None or any("params" in call for call in calls.values())
-    return environment().get_template("package_source.c.j2").render(
+    return template("package_source.c.j2").render(
         **_common(controller, options),
         maths=options.maths,
         count={
@@ -125,7 +114,7 @@ def allocator_files(controller: Controller, options: Options) -> dict[str, str]:
     """Return the units of the allocator under the package's own names, so that two of them link into one image."""
     if controller.allocation is None:
         return {}
-    sizes = environment().get_template("package_sizes.j2").render(
+    sizes = template("package_sizes.j2").render(
         **_common(controller, options), allocation=_sizes(controller)
     )  # fmt: skip
     runtime, files = assets.folder("codegen") / "runtime", {}
@@ -136,11 +125,10 @@ def allocator_files(controller: Controller, options: Options) -> dict[str, str]:
 
 
 def _common(controller: Controller, options: Options) -> dict[str, Any]:
-    title = controller.title.replace("*/", "* /").replace("\n", " ")
     return {
         "name": options.name,
         "NAME": options.name.upper(),
-        "title": title,
+        "title": controller.title,
         "scheme": controller.scheme,
         "real": options.real,
     }

@@ -1,17 +1,12 @@
-"""The boards of `codegen/targets`: build a package for one, run it in its emulator, read what it wrote.
+"""Build a package for a board of `casadi_gnc.embedded.boards`, run it in its emulator, read what it wrote.
 
-A target is one TOML file there. The emulator advances its clock with each instruction, so counts are
-exact and the same on every host.
+The emulator advances its clock with each instruction, so counts are exact and the same on every host.
 """
 
 from __future__ import annotations
 
-import difflib
 import re
-import shutil
 import subprocess
-import tempfile
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.embedded import stack
+from casadi_gnc.embedded.boards import Target
 from casadi_gnc.errors import TargetError
-from casadi_gnc.registry import Registry
 from casadi_gnc.system import assets
+from casadi_gnc.system.folders import workshop
 
 #: Flags of every target; the same as on the host, with sections that the linker may drop.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-ffunction-sections", "-fdata-sections")
@@ -36,41 +32,6 @@ _DOUBLE = re.compile(
 )
 #: Numbers at the head of what a program writes, in the order of `enum number` in measure.c.
 _NUMBERS = 8
-
-
-@dataclass(frozen=True)
-class Target:
-    """Describe a board: what to compile with, what to run in; fields as in its file, and the folder of that."""
-
-    name: str
-    title: str
-    compiler: str
-    flags: tuple[str, ...]
-    link: tuple[str, ...]
-    script: str
-    sources: tuple[str, ...]
-    emulator: tuple[str, ...]
-    hardware: tuple[str, ...]
-    packages: tuple[str, ...]
-    folder: Path = Path()
-
-    def place(self, name: str) -> Path:
-        """Return a source or script of the target: beside its own file, else among the shipped ones."""
-        beside = self.folder / name
-        return beside if beside.is_file() else assets.folder("codegen") / "targets" / name
-
-    def missing(self) -> list[str]:
-        """Return the commands that are not installed."""
-        return [tool for tool in (self.compiler, self.emulator[0]) if shutil.which(tool) is None]
-
-    def need(self) -> None:
-        """Raise `TargetError` naming what is missing and how to get it."""
-        if self.missing():
-            raise TargetError(
-                f"target {self.name} needs {' and '.join(self.missing())}, which is not installed; "
-                f"`make targets` installs it (Debian packages {', '.join(self.packages)}), "
-                "and --target host works without"
-            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,77 +85,6 @@ class Measured:
         }
 
 
-def _shipped(name: str) -> Path:
-    return assets.folder("codegen") / "targets" / f"{name}.toml"
-
-
-#: Targets of installed packages by name: a `Target`, or the path of its file.
-REGISTRY = Registry(
-    "target",
-    "casadi_gnc.targets",
-    {},
-    is_one=lambda thing: isinstance(thing, (Target, Path)),
-    expected="a casadi_gnc.embedded.targets.Target, or the pathlib.Path of its file",
-    error=TargetError,
-)
-
-
-def names() -> list[str]:
-    """Return the names of the targets there are, shipped ones first."""
-    own = sorted(path.stem for path in (assets.folder("codegen") / "targets").glob("*.toml"))
-    return [*own, *REGISTRY.names()]
-
-
-def find(name: Any) -> Target:
-    """Return a target by its name, by the path of its own file ("./board.toml"), or as it is.
-
-    Raises
-    ------
-    TargetError
-        For a name that is none, naming those there are, or a file that does not describe a target.
-    """
-    if isinstance(name, Target):
-        return name
-    if isinstance(name, Path) or str(name).endswith(".toml"):
-        return of_file(Path(name))
-    if _shipped(str(name)).is_file():
-        return of_file(_shipped(str(name)))
-    if name not in REGISTRY.names():
-        near = difflib.get_close_matches(str(name), names(), 1)
-        hint = f"did you mean {near[0]!r}? There" if near else "there"
-        known = ", ".join(names())
-        raise TargetError(f"no target {name!r}; {hint} is host, {known}, and the path of a file of your own")
-    return find(REGISTRY.find(name))
-
-
-def of_file(path: Path) -> Target:
-    """Return the target that a TOML file describes; its sources and linker script lie beside it or are shipped ones."""
-    try:
-        fields = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise TargetError(f"the target {path} cannot be read: {error}") from error
-    known = [field for field in Target.__dataclass_fields__ if field not in ("name", "folder")]
-    wrong = [key for key in fields if key not in known]
-    missing = [key for key in known if key not in fields]
-    if wrong or missing:
-        told = f"unknown key {wrong[0]!r}" if wrong else f"{missing[0]!r} is missing"
-        raise TargetError(f"the target {path.name}: {told}; expected {', '.join(known)}")
-    for key, value in fields.items():
-        is_text = Target.__dataclass_fields__[key].type == "str"
-        fits = isinstance(value, str) if is_text else _are_texts(value)
-        if not fits:
-            expected = "a text" if is_text else "a list of texts"
-            raise TargetError(f"the target {path.name}: {key} is {value!r}, expected {expected}")
-    if not fields["emulator"]:
-        raise TargetError(f"the target {path.name}: emulator is empty, expected the command that runs an image")
-    whole: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
-    return Target(path.stem, **whole, folder=path.parent)
-
-
-def _are_texts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(one, str) for one in value)
-
-
 def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", float_only: bool = False) -> Measured:
     """Build a package for a target and replay its vectors there.
 
@@ -212,8 +102,7 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
         package of floats, or the program does not end well.
     """
     target.need()
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        shop = Path(workshop)
+    with workshop() as shop:
         objects = [
             _compile(source, shop, folder, target, (*FLAGS, optimise, "-fcallgraph-info=su"))
             for source in units(folder, name)

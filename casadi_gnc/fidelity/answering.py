@@ -6,6 +6,7 @@ the hash of the question and of everything that could change it: problem files, 
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Iterator
@@ -134,11 +135,7 @@ def _answered(questions: list[Question], processes: int, fresh: bool) -> Iterato
         for future in as_completed(running):
             question, found = running[future], _result(future)
             if "failure" not in found:
-                folder.mkdir(parents=True, exist_ok=True)
-                text = json.dumps(found)
-                write_beside(
-                    folder / f"{question.key(surroundings)}.json", lambda path, text=text: path.write_text(text)
-                )
+                _remember(folder / f"{question.key(surroundings)}.json", found)
             yield question, found
 
 
@@ -157,6 +154,13 @@ def _remembered(path: Path) -> dict[str, Any] | None:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, json.JSONDecodeError):
         return None
+
+
+def _remember(path: Path, found: dict[str, Any]) -> None:
+    """Keep an answer for the next time, where the cache can be written."""
+    with contextlib.suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_beside(path, lambda place: place.write_text(json.dumps(found)))
 
 
 def find(question: Question) -> dict[str, Any]:

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from casadi_gnc.fidelity.claims import ClaimsFile
 from casadi_gnc.fidelity.page import TEMPLATE
 from casadi_gnc.fidelity.verdict import Answer, Verdict
 from casadi_gnc.system.files import write_beside
+from casadi_gnc.system.templates import environment
 
 
 @dataclass(frozen=True)
@@ -78,13 +77,16 @@ def write(folder: Path, reports: list[PaperReport], figures: dict[str, list[Path
     data, page = folder / "claims.json", folder / "claims.html"
     text = json.dumps(as_data(reports), indent=2, allow_nan=False) + "\n"
     write_beside(data, lambda path: path.write_text(text, encoding="utf-8"))
-    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, autoescape=True)
-    rendered = environment.from_string(TEMPLATE).render(
-        reports=reports,
-        printed=printed,
-        ours=ours,
-        deviation=deviation,
-        figures={name: [path.name for path in paths] for name, paths in figures.items()},
+    rendered = (
+        environment(markup=True)
+        .from_string(TEMPLATE)
+        .render(
+            reports=reports,
+            printed=printed,
+            ours=ours,
+            deviation=deviation,
+            figures={name: [path.name for path in paths] for name, paths in figures.items()},
+        )
     )
     write_beside(page, lambda path: path.write_text(rendered, encoding="utf-8"))
     return [data, page]

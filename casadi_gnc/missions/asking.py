@@ -1,4 +1,4 @@
-"""Ask a law, a plant or a craft, and tell its author what is wrong with the answer.
+"""Ask a law or a plant for an expression, and tell its author what is wrong with the answer.
 
 Whoever writes a law is told in one sentence, with the class and the method: a call that fails, a list in the
 place of a column, a column of another size, NaN that was meant for "unknown".
@@ -13,10 +13,8 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc import guests
-from casadi_gnc.errors import FlightError, GncError, LawError
-from casadi_gnc.missions.plant import Plant
+from casadi_gnc.errors import GncError, LawError
 from casadi_gnc.signals import Layout
-from casadi_gnc.tables.part import MisfitError
 
 #: What Python decides at once is not known of a symbol.
 _ON_SYMBOLS = (
@@ -24,35 +22,26 @@ _ON_SYMBOLS = (
 )
 
 
-def plant_of(craft: Any) -> Plant:
-    """Return the plant of a craft, if that is what `plant` returns."""
-    found = ask(craft, "plant")
-    if not isinstance(found, Plant):
-        raise FlightError(f"{type(craft).__name__}.plant returned {_kind(found)}, expected a casadi_gnc.Plant")
-    return found
-
-
 def ask(owner: Any, method: str, *arguments: Any) -> Any:
     """Return what a method of a law, a plant or a craft returns; its failure is one sentence with its own lines."""
     function: Callable[..., Any] = getattr(owner, method)
     try:
         return function(*arguments)
-    except (GncError, MisfitError):
+    except GncError:
         raise
     except Exception as error:  # whatever an author's code does
         raise LawError(f"{type(owner).__name__}.{method} failed: {_told(error)}") from error
 
 
 def _told(error: Exception) -> str:
-    """Return an exception as a sentence; of CasADi's, the first line that says something."""
+    """Return an exception as a sentence with its author's lines; of CasADi's many lines, the one that says it."""
     text = str(error).strip()
     if "truth value" in text:
-        return _ON_SYMBOLS + "".join(guests.told(error).partition("\n  ")[1:])
-    if isinstance(error, (RuntimeError, NotImplementedError)) and "\n" in text:
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        sentence = next((line for line in lines if "Wrong number or type" in line or "mismatch" in line), lines[-1])
-        return type(error)(sentence).args[0] + "".join(guests.told(error).partition("\n  ")[1:2])
-    return guests.told(error)
+        return _ON_SYMBOLS + guests.own_lines(error)
+    if not isinstance(error, (RuntimeError, NotImplementedError)) or "\n" not in text:
+        return guests.told(error)
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    return next((line for line in lines if "Wrong number or type" in line), lines[-1]) + guests.own_lines(error)
 
 
 def column(owner: Any, method: str, value: Any, expected: Layout | int, what: str = "") -> Any:
@@ -73,7 +62,7 @@ def column(owner: Any, method: str, value: Any, expected: Layout | int, what: st
         raise LawError(f"{name} returned an MX expression, {wanted} of SX; functions of MX have to be expanded")
     if not isinstance(value, (ca.SX, ca.DM, np.ndarray, int, float, np.number)):
         raise LawError(f"{name} returned {_kind(value)}, {wanted}")
-    found = ca.SX(value) if not isinstance(value, np.ndarray) else ca.SX(ca.DM(value))
+    found = ca.SX(value) if isinstance(value, (ca.SX, ca.DM)) else ca.SX(ca.DM(np.asarray(value, dtype=float)))
     shape = found.shape
     if size and (found.numel() != size or (shape[1] != 1 and size > 1)):
         raise LawError(f"{name} returned {shape[0]} x {shape[1]} numbers, {wanted}")

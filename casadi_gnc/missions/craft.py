@@ -18,6 +18,7 @@ from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError, ProblemError
 from casadi_gnc.missions.actuation import Actuation, Actuators
+from casadi_gnc.missions.describing import shortened
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.registry import Registry
@@ -60,6 +61,10 @@ class Craft(Part):
         except ValidationError as error:
             told = "; ".join(f"{'.'.join(map(str, path))}: {text}" for path, text in sentences(error, type(self), keys))
             raise ProblemError(told, type(self).__name__) from error
+
+    def __repr__(self) -> str:
+        told = [shortened(f"  {name} = {value!r}") for name, value in self]
+        return "\n".join([f"{type(self).__name__}:", *told])
 
     def plant(self) -> Plant:
         """Return the truth: what moves, and what the sensors say."""

@@ -10,26 +10,25 @@ import ctypes
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import casadi as ca
 import numpy as np
 
-from casadi_gnc.allocation import Allocate, OnlineInFlight, online
+from casadi_gnc.allocation import OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
-from casadi_gnc.embedded.source import environment
 from casadi_gnc.errors import FlightError
-from casadi_gnc.mathematics.noise import uniform_count, uniforms
+from casadi_gnc.mathematics.noise import uniform_count
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.tapes import Tapes, call
 from casadi_gnc.registry import Registry
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers
+from casadi_gnc.system.templates import template
 
 #: Engines by name: shipped ones, and those of installed packages; each is made of (mission, scheme, tapes).
 REGISTRY = Registry(
     "engine",
     "casadi_gnc.engines",
-    {"c": f"{__name__}:CompiledEngine", "vm": f"{__name__}:VirtualMachineEngine"},
+    {"c": f"{__name__}:CompiledEngine", "vm": "casadi_gnc.missions.machine_engine:VirtualMachineEngine"},
     is_one=lambda thing: isinstance(thing, type) and all(hasattr(thing, part) for part in ("name", "first", "run")),
     expected="a class with name, first and run, as casadi_gnc.missions.engines.Engine",
     error=FlightError,
@@ -80,39 +79,35 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         """Return the call of a tape; `sample` owns what one evaluation of the controller leaves behind."""
         return call(tapes.functions[name], _places(sample) | places)
 
-    return (
-        environment()
-        .get_template("flight.c.j2")
-        .render(
-            title=f"{mission.name}, scheme {scheme.name}",
-            mode=timing.mode,
-            maths=maths,
-            real="double",
-            states=plant.state.size,
-            measurements=plant.measurement.size,
-            memory=scheme.law.memory.size,
-            efforts=scheme.actuation.effort.size,
-            actuators=plant.inputs.size,
-            noise=plant.noise.size,
-            noise_every=mission.noise.every,
-            uniforms=uniform_count(plant.noise.size),
-            report=scheme.actuation.allocator.report.size,
-            row=tapes.row.size,
-            tally=tapes.tally.size,
-            substeps=timing.substeps,
-            period=c_constant(timing.sample_period),
-            symbolic=tapes.symbolic,
-            online=isinstance(scheme.actuation.allocator, OnlineInFlight),
-            inexact=StepStatus.ALLOCATION_INEXACT.value,
-            failed=StepStatus.ALLOCATION_FAILED.value,
-            fused=fused,
-            call=called,
-            tapes=[
-                print_function(tape, maths=maths)
-                for name, tape in tapes.functions.items()
-                if not (fused and name in ("before", "allocate"))
-            ],
-        )
+    return template("flight.c.j2").render(
+        title=f"{mission.name}, scheme {scheme.name}",
+        mode=timing.mode,
+        maths=maths,
+        real="double",
+        states=plant.state.size,
+        measurements=plant.measurement.size,
+        memory=scheme.law.memory.size,
+        efforts=scheme.actuation.effort.size,
+        actuators=plant.inputs.size,
+        noise=plant.noise.size,
+        noise_every=mission.noise.every,
+        uniforms=uniform_count(plant.noise.size),
+        report=scheme.actuation.allocator.report.size,
+        row=tapes.row.size,
+        tally=tapes.tally.size,
+        substeps=timing.substeps,
+        period=c_constant(timing.sample_period),
+        symbolic=tapes.symbolic,
+        online=isinstance(scheme.actuation.allocator, OnlineInFlight),
+        inexact=StepStatus.ALLOCATION_INEXACT.value,
+        failed=StepStatus.ALLOCATION_FAILED.value,
+        fused=fused,
+        call=called,
+        tapes=[
+            print_function(tape, maths=maths)
+            for name, tape in tapes.functions.items()
+            if not (fused and name in ("before", "allocate"))
+        ],
     )
 
 
@@ -206,113 +201,3 @@ class CompiledEngine:
             self._failure = error
             return 0
         return 1  # ctypes answers 0 for an exception that escapes, so 0 must mean stop
-
-
-class _Tape:
-    """Call a CasADi function on numpy columns by their names, without the cost of its general call."""
-
-    def __init__(self, function: ca.Function) -> None:
-        buffer: Any
-        buffer, self._trigger = function.buffer()
-        self._buffer = buffer  # the trigger points into it
-        self._in = {name: np.zeros(function.numel_in(i)) for i, name in enumerate(function.name_in())}
-        self._out = {name: np.zeros(function.numel_out(i)) for i, name in enumerate(function.name_out())}
-        for i, column in enumerate(self._in.values()):
-            if column.size:
-                buffer.set_arg(i, memoryview(column.data))
-        for i, column in enumerate(self._out.values()):
-            if column.size:
-                buffer.set_res(i, memoryview(column.data))
-
-    def __call__(self, **columns: Any) -> dict[str, np.ndarray]:
-        for name, own in self._in.items():
-            own[:] = columns[name]
-        self._trigger()
-        return {name: column.copy() for name, column in self._out.items()}
-
-    def one(self, **columns: Any) -> np.ndarray:
-        """Return the only result."""
-        (result,) = self(**columns).values()
-        return result
-
-
-class VirtualMachineEngine:
-    """Fly on CasADi's virtual machine: no compiler needed, some hundred times slower.
-
-    A sample is a dictionary of columns by the names that the tapes' ports have.
-    """
-
-    name = "vm"
-
-    def __init__(self, mission: Mission, scheme: Scheme, tapes: Tapes) -> None:
-        self._tape = {name: _Tape(function) for name, function in tapes.functions.items()}
-        self._timing, self._noise = mission.timing, mission.noise
-        self._states, self._normals = mission.truth.state.size, mission.truth.noise.size
-        self._drawn = (-1, np.zeros(self._normals))
-        self._report = np.zeros(scheme.actuation.allocator.report.size)
-        self._solve: Allocate | None = None if tapes.symbolic else scheme.actuation.allocator.start()
-
-    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the first measurement, and the law's memory at it."""
-        measured = self._tape["sense"].one(t=0.0, x=x, noise=self._draw(0))
-        return measured, self._tape["start"].one(y=measured)
-
-    def _draw(self, sample: int) -> np.ndarray:
-        """Return the normal numbers of a sample, held over `every` sample periods."""
-        draw = sample // self._noise.every
-        if self._normals and draw != self._drawn[0]:
-            uniform = uniforms(self._noise.seed, draw, uniform_count(self._normals))
-            self._drawn = (draw, self._tape["draw"].one(uniform=uniform))
-        return self._drawn[1]
-
-    def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
-        """Fly sample by sample, as the loop of `flight.c.j2` does."""
-        tape, kept = self._tape, 0
-        for k in range(first, first + samples):
-            s: dict[str, Any] = {"t": k * self._timing.sample_period, "x": carried.x, "m": carried.m}
-            s = self._control(carried, {**s, "noise": self._draw(k)})
-            s["flags"] = s["flags"] + s["allocation_flags"]
-            carried.good[:] = s["accepted"]
-            row = tape["observe"].one(**s)
-            carried.tally[:] = tape["tally"].one(row=row, tally=carried.tally)
-            if k % decimation == 0:
-                record[kept] = row
-                kept += 1
-            self._advance(carried, s)
-            carried.x[:] = tape["settle"].one(x=carried.x)
-            carried.actuators[:] = s["told"]
-        return samples
-
-    def _control(self, carried: Carried, s: dict[str, Any]) -> dict[str, Any]:
-        """Return the columns of a sample completed by what the controller computes."""
-        tape = self._tape
-        s = {**s, "good": carried.good, "actuators": carried.actuators, "report": self._report, "allocation_flags": 0.0}
-        if "stage" in tape:
-            return {**s, **tape["stage"](**s)}
-        s["y"] = tape["sense"].one(**s)
-        s |= tape["before"](**s)
-        if self._solve is None:
-            return {**s, **tape["allocate"](**s)}
-        told, noted, report = self._solve(s["limited"], carried.actuators.copy(), s["lower"], s["upper"])
-        return {**s, "told": told, "report": report, "allocation_flags": float(noted)}
-
-    def _slope(self, s: dict[str, Any]) -> np.ndarray:
-        """Return the rates of plant and memory at a point of the integrator."""
-        return s["slope"] if "slope" in s else self._tape["flow"].one(**s)
-
-    def _advance(self, carried: Carried, s: dict[str, Any]) -> None:
-        tape, h, n, t = self._tape, self._timing.sample_period, self._states, s["t"]
-        if self._timing.mode == "sampled":
-            carried.m[:] = tape["after"].one(**s)
-            step = h / self._timing.substeps
-            for i in range(self._timing.substeps):
-                carried.x[:] = tape["plant"].one(**{**s, "t": t + i * step, "x": carried.x})
-            return
-        state = np.concatenate([carried.x, s["memory"]])
-        slopes = [self._slope(s)]
-        for length in (h / 2, h / 2, h):
-            moved = tape["point"].one(state=state, slope=slopes[-1], length=length)
-            at = {"t": t + length, "x": moved[:n], "m": moved[n:], "noise": s["noise"]}
-            slopes.append(self._slope(self._control(carried, at)))
-        joined = tape["join"].one(state=state, **{f"k{i}": slope for i, slope in enumerate(slopes, 1)})
-        carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -15,6 +15,7 @@ from casadi_gnc.laws import Law
 from casadi_gnc.missions import asking
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.recording import row_of
 from casadi_gnc.missions.scheme import Metric, Scheme
 from casadi_gnc.missions.timing import Timing
 from casadi_gnc.signals import Layout, Signal
@@ -102,14 +103,13 @@ def refuse(mission: Mission) -> None:
         if names.count(name) > 1:
             raise FlightError(f"two schemes of {mission.name} are named {name!r}")
     plant, craft = mission.truth, type(mission.craft).__name__
-    begun = {**asking.ask(mission.craft, "start"), **mission.start_from}
-    if set(begun) != set(plant.state.names):
-        told = f"gives {', '.join(begun) or 'nothing'}, and the plant's state is {', '.join(plant.state.names)}"
-        raise FlightError(f"{craft}.start {told}; give each of them, and nothing else")
-    for signal in plant.state.signals:
-        count = len(begun[signal.name]) if hasattr(begun[signal.name], "__len__") else 1
-        if count != signal.size:
-            raise FlightError(f"{craft}.start gives {count} numbers of {signal.name}, expected {signal.size}")
+    unknown = [name for name in mission.start_from if name not in plant.state]
+    if unknown:
+        raise FlightError(
+            f"start_from names {unknown[0]!r}, which is no state; there is {', '.join(plant.state.names)}"
+        )
+    if len(mission.start) != plant.state.size:
+        raise FlightError(f"start_from gives {len(mission.start)} numbers in all, expected {plant.state.size}")
     for scheme in mission.schemes:
         actuation, law = scheme.actuation, type(scheme.law)
         if len(actuation.lower) != plant.inputs.size:
@@ -132,7 +132,7 @@ def complete(mission: Mission, metric: Metric) -> Metric:
     """Return a metric with its unit; raise `FlightError` where a scheme does not record its signal."""
     unit = ""
     for scheme in mission.schemes:
-        row = Loop(mission, scheme).row
+        row = row_of(Loop(mission, scheme))
         if metric.signal not in row:
             raise FlightError(
                 f"{metric.signal!r} of the metric {metric.name!r} is no signal of scheme {scheme.name}; "

@@ -12,10 +12,11 @@ import numpy as np
 from casadi_gnc.embedded.printer import Math
 from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.missions import metrics, tapes
-from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engine, VirtualMachineEngine
+from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engine
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.loop import funnel_signals
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.timing import Mode
 from casadi_gnc.status import StepStatus
@@ -67,7 +68,7 @@ def fly(
     if mode is not None and mode != mission.timing.mode:
         mission = mission.with_timing(mode=mode)
     chosen = mission.scheme(scheme)
-    built = tapes.build(mission, chosen)
+    built = tapes.tapes_of(mission, chosen)
     runner, notes = _engine(mission, chosen, built, engine, maths)
     carried = begin(mission, built, runner)
     total, chunk = mission.timing.samples, _CHUNK if built.symbolic else 200
@@ -93,7 +94,7 @@ def fly(
     }
     period = mission.timing.sample_period
     raised = metrics.statuses(built.tally, carried.tally)
-    values = metrics.read(mission.metrics, built.tally, carried.tally, (total - 1) * period, period)
+    values = metrics.read(tuple(mission.metrics), built.tally, carried.tally, (total - 1) * period, period)
     return Flight(
         mission=mission.name,
         scheme=chosen.name,
@@ -138,7 +139,7 @@ def begin(mission: Mission, built: tapes.Tapes, runner: Engine) -> Carried:
         m=memory,
         actuators=np.zeros(mission.truth.inputs.size),
         good=good,
-        tally=metrics.fresh(mission.metrics, built.tally),
+        tally=metrics.fresh(tuple(mission.metrics), built.tally),
     )
 
 

@@ -22,7 +22,6 @@ plant fits: what one leaves out is empty.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -31,8 +30,7 @@ from casadi_gnc.laws import advance
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.missions import asking
-from casadi_gnc.missions.scheme import Funnel, Scheme
-from casadi_gnc.signals import Layout, Signal
+from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.status import StepStatus
 
 if TYPE_CHECKING:
@@ -258,72 +256,7 @@ class Loop:
             bits |= {StepStatus.ALLOCATION_INEXACT, StepStatus.ALLOCATION_FAILED}
         return [bit for bit in StepStatus if bit in bits]
 
-    # What is recorded.
-
-    @cached_property
-    def row(self) -> Layout:
-        """The columns of a record."""
-        effort, plant = self.actuation.named, self.plant
-        return Layout(
-            (
-                Signal("time", 1, "s"),
-                *plant.state.signals,
-                *effort("wanted").signals,
-                *effort("limited").signals,
-                *effort("achieved").signals,
-                *plant.inputs.signals,
-                *plant.outputs.signals,
-                *self.law.outputs.signals,
-                *(signal for each in self.mission.funnels for signal in funnel_signals(self.mission, each).signals),
-                *self.actuation.allocator.report.signals,
-                Signal("status", 1),
-            )
-        )
-
-    def _watched(self, t: Any, y: Any) -> tuple[dict[str, Any], Any]:
-        """Return the walls and the use of the mission's funnels, and whether a signal has left its own."""
-        shown, left = {}, ca.SX(0)
-        for funnel in self.mission.funnels:
-            watched = y[self.plant.measurement.place(funnel.signal)]
-            values = (*funnel.bounds.walls(t), funnel.bounds.use(t, watched))
-            shown.update(zip(funnel_signals(self.mission, funnel).names, values, strict=True))
-            left = ca.logic_or(left, funnel.bounds.left(t, watched))
-        return shown, left
-
-    def observed(self, s: Symbols, flags: Any, report: Any) -> Any:
-        """Return one row of the record, its status completed by what is seen from outside."""
-        plant, law, actuation = self.plant, self.law, self.actuation
-        seen = self.seen(s.y)
-        outside = {
-            StepStatus.DIVERGED: ca.logic_not(bounds.all_of(ca.fabs(s.x) <= CREDIBLE)),
-            **asking.flags(plant, "status", asking.ask(plant, "status", s.t, s.x, s.actuators)),
-        }
-        shown, left = self._watched(s.t, s.y)
-        if self.mission.funnels and StepStatus.FUNNEL_LEFT not in law.status(s.t, seen, s.m):
-            outside[StepStatus.FUNNEL_LEFT] = left
-        efforts = {"wanted": s.wanted, "limited": s.limited, "achieved": self.made(s.y, s.actuators)}
-        for stage, value in efforts.items():
-            shown.update(vars(actuation.named(stage).split(value)))
-        return self.row.pack(
-            time=s.t,
-            **vars(plant.state.split(s.x)),
-            **vars(plant.inputs.split(s.actuators)),
-            **asking.shown(plant, asking.ask(plant, "show", s.t, s.x, s.actuators), plant.outputs),
-            **asking.shown(law, asking.ask(law, "show", s.t, seen, s.m), law.outputs),
-            **shown,
-            **vars(actuation.allocator.report.split(report)),
-            status=flags + self.judged(s.y, s.limited, s.actuators) + weighed(outside),
-        )
-
 
 def weighed(flags: dict[StepStatus, Any]) -> Any:
     """Return the sum of flags, each by the value of its bit."""
     return sum(bit.value * flag for bit, flag in flags.items())
-
-
-def funnel_signals(mission: Mission, funnel: Funnel) -> Layout:
-    """Return what is recorded of a funnel: lower wall, upper wall, use; with its signal's name if there are several."""
-    watched = mission.truth.measurement.signal(funnel.signal)
-    ending = f"_{funnel.signal}" if len(mission.funnels) > 1 else ""
-    walls = (Signal(f"funnel_{name}{ending}", watched.size, watched.unit) for name in ("lower", "upper"))
-    return Layout((*walls, Signal(f"funnel_use{ending}")))

@@ -23,6 +23,7 @@ however few samples are kept. Status bits are counted in the same way, and their
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 NEVER = -1.0
 
 
-def fold(metrics: tuple[Metric, ...], row: Layout) -> tuple[Layout, ca.Function]:
+def fold(metrics: Sequence[Metric], row: Layout) -> tuple[Layout, ca.Function]:
     """Return the layout of the tally and the function (row, tally) -> tally."""
     counts = tuple(Signal(f"count_{bit.name}") for bit in StepStatus)
     firsts = tuple(Signal(f"first_{bit.name}", 1, "s") for bit in StepStatus)
@@ -86,7 +87,7 @@ def _next(metric: Metric, signal: Any, time: Any, so_far: Any) -> Any:
     return value
 
 
-def fresh(metrics: tuple[Metric, ...], layout: Layout) -> np.ndarray:
+def fresh(metrics: Sequence[Metric], layout: Layout) -> np.ndarray:
     """Return the tally before the first sample."""
     tally = np.zeros(layout.size)
     for metric in metrics:
@@ -97,7 +98,7 @@ def fresh(metrics: tuple[Metric, ...], layout: Layout) -> np.ndarray:
 
 
 def read(
-    metrics: tuple[Metric, ...], layout: Layout, tally: np.ndarray, last: float, period: float
+    metrics: Sequence[Metric], layout: Layout, tally: np.ndarray, last: float, period: float
 ) -> dict[str, float | None]:
     """Return the values of the metrics after the sample at time `last` [s].
 

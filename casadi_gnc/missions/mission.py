@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import pickle
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -17,44 +17,17 @@ from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.guests import GuestFile
-from casadi_gnc.missions import asking, fitting, functions
+from casadi_gnc.missions import fitting, functions, parts, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
+from casadi_gnc.missions.origin import Origin, keys_of_timing
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.stepper import Stepper
 from casadi_gnc.missions.timing import Noise, Timing
-from casadi_gnc.tables.part import plain
 
 #: Changes of `with_scheme` that are of the scheme; all others are gains of its law.
 _OF_A_SCHEME = ("law", "feedback", "actuation", "title")
-
-
-@dataclass(frozen=True)
-class Origin:
-    """Say from which file a mission was read.
-
-    Parameters
-    ----------
-    name : of the file.
-    text : its content.
-    changes : values that were put in the place of the file's, by path.
-    guests : files of the user's own code that it names.
-    folder : where it lay, for relative names.
-    """
-
-    name: str
-    text: str
-    changes: Mapping[str, Any] = field(default_factory=dict)
-    guests: tuple[GuestFile, ...] = ()
-    folder: Path = Path()
-
-    @property
-    def digest(self) -> str:
-        """Hash of the text, what was changed, and the user's own code."""
-        lines = [f"\n# {key} = {value!r}" for key, value in sorted(self.changes.items())]
-        lines += [f"\n# {file.path} {file.sha256}" for file in self.guests]
-        return hashlib.sha256((self.text + "".join(lines)).encode()).hexdigest()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,17 +86,18 @@ class Mission:
         object.__setattr__(self, "schemes", tuple(held))
         object.__setattr__(self, "funnels", tuple(self.funnels))
         fitting.refuse(self)
+        probing.probe(self)
         object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
 
     @cached_property
     def truth(self) -> Plant:
         """The plant: what truly moves, and what the sensors say."""
-        return asking.plant_of(self.craft)
+        return parts.plant_of(self.craft)
 
     @cached_property
     def start(self) -> list[float]:
         """The plant's state at t = 0, in its order."""
-        by_signal = {**asking.ask(self.craft, "start"), **self.start_from}
+        by_signal = {**parts.start_of(self.craft, self.truth), **self.start_from}
         return [float(value) for name in self.truth.state.names for value in _flat(by_signal[name])]
 
     @cached_property
@@ -160,7 +134,7 @@ class Mission:
         Raises `LawError` where a law cannot work at that sample period.
         """
         changed = replace(
-            self, timing=replace(self.timing, **changes), origin=self._noted(_keys_of_timing(self, changes))
+            self, timing=replace(self.timing, **changes), origin=self._noted(keys_of_timing(self.timing, changes))
         )
         for scheme in changed.schemes:
             scheme.law.check_hold()
@@ -181,11 +155,7 @@ class Mission:
         return replace(self, schemes=(changed,), origin=self._noted(paths))
 
     def _noted(self, changes: Mapping[str, Any]) -> Origin | None:
-        """Return where the mission came from with these keys changed; None where no file could say so."""
-        values = {key: plain(value) for key, value in changes.items() if not _is_symbol(value)}
-        if self.origin is None or len(values) < len(changes) or not all(map(_is_data, values.values())):
-            return None
-        return replace(self.origin, changes={**self.origin.changes, **values})
+        return None if self.origin is None else self.origin.with_changes(changes)
 
     def with_craft(self, craft: Craft) -> Mission:
         """Return the mission of another craft; what the schemes believe stays."""
@@ -252,42 +222,14 @@ class Mission:
         parts = [(each.law, each.law.belief, each.actuation, each.actuation.allocator) for each in self.schemes]
         found = guests.files_of(self.craft, self.truth, *(part for each in parts for part in each))
         named = () if self.origin is None else self.origin.guests
-        return tuple(dict.fromkeys([*named, *found]))
+        # The same text is the same code, wherever another mission has it.
+        return tuple({file.module: file for file in (*found, *named)}.values())
 
 
 def _restored(files: tuple[GuestFile, ...], content: bytes) -> Mission:
     """Return a mission from a pickle; the code that it needs is run first."""
     guests.run_all(files)
     return Mission(**pickle.loads(content))
-
-
-#: Keys of [timing] by the fields of `Timing`.
-_TIMING_KEYS = {
-    "mode": "mode",
-    "sample_period": "sample_period_s",
-    "duration": "duration_s",
-    "substeps": "plant_substeps",
-}
-
-
-def _keys_of_timing(mission: Mission, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return changes of the timing as a file has them; what is recorded follows from the sample period."""
-    timing = replace(mission.timing, **changes)
-    keys = {f"timing.{_TIMING_KEYS[name]}": value for name, value in changes.items() if name in _TIMING_KEYS}
-    if "record_every" in changes or (timing.record_every > 1 and "sample_period" in changes):
-        keys["timing.record_period_s"] = timing.record_every * timing.sample_period
-    return keys
-
-
-def _is_symbol(value: Any) -> bool:
-    return isinstance(value, (ca.SX, ca.MX))
-
-
-def _is_data(value: Any) -> bool:
-    """Return whether a value can stand in a file."""
-    if isinstance(value, list):
-        return all(map(_is_data, value))
-    return isinstance(value, (bool, int, float, str))
 
 
 def _flat(values: Any) -> list[float]:
@@ -301,4 +243,5 @@ def _digest(mission: Mission) -> str:
     for scheme in mission.schemes:
         told.append(f"{scheme.name} {scheme.law!r} {scheme.actuation!r} {scheme.feedback}")
     told += [f"{file.path} {file.sha256}" for file in mission.guests()]
-    return hashlib.sha256("\n".join(told).encode()).hexdigest()
+    # Functions show where they lie in memory, which says nothing.
+    return hashlib.sha256(re.sub(r" at 0x[0-9a-f]+", "", "\n".join(told)).encode()).hexdigest()

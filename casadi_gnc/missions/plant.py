@@ -21,30 +21,16 @@ class Plant:
     CasADi symbols. `rate` must be given; the others have defaults: perfect sensors, no noise.
     """
 
-    @property
-    def state(self) -> Layout:
-        """What the plant remembers."""
-        raise TypeError(f"{type(self).__name__} defines no state")
-
-    @property
-    def measurement(self) -> Layout:
-        """What the sensors give; `limit` of a signal is the largest magnitude that can be true."""
-        raise TypeError(f"{type(self).__name__} defines no measurement")
-
-    @property
-    def inputs(self) -> Layout:
-        """What the actuators are told."""
-        raise TypeError(f"{type(self).__name__} defines no inputs")
-
-    @property
-    def noise(self) -> Layout:
-        """Standard normal numbers, drawn afresh and held, that `measure` and `rate` scale."""
-        return Layout()
-
-    @property
-    def outputs(self) -> Layout:
-        """True signals that are recorded besides the state."""
-        return Layout()
+    #: What the plant remembers, a `Layout`; an attribute, or a property where it depends on the data. Must be given.
+    state: Any
+    #: What the sensors give, a `Layout`; `limit` of a signal is the largest magnitude that can be true. Must be given.
+    measurement: Any
+    #: What the actuators are told, a `Layout`. Must be given.
+    inputs: Any
+    #: Standard normal numbers, drawn afresh and held, that `measure` and `rate` scale.
+    noise: Any = Layout()
+    #: True signals that are recorded besides the state.
+    outputs: Any = Layout()
 
     def inertias(self) -> Mapping[str, Any]:
         """Return the inertias, (3, 3), [kg m^2], of the bodies that the plant moves, by what each is of."""

@@ -6,8 +6,6 @@ a compiler it is CasADi's machine, and `compiled` says so.
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +17,7 @@ from casadi_gnc.embedded.machine import Machine
 from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.missions.onboard import describe
 from casadi_gnc.status import StepStatus
+from casadi_gnc.system.folders import workshop
 
 if TYPE_CHECKING:
     from casadi_gnc.missions.mission import Mission
@@ -104,8 +103,7 @@ class _Compiled:
     def __init__(self, controller: Controller) -> None:
         options = Options("stepper")
         self._outputs = controller.outputs.size + 1
-        with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as place:
-            folder = Path(place)
+        with workshop() as folder:
             files = package.flight_files(controller, options)
             package.put(folder, {**files, "test/replay.h": package.replay_header(controller, options, 1)})
             self._host = HostPackage(folder, options.name)

@@ -37,6 +37,7 @@ from casadi_gnc.mathematics import noise
 from casadi_gnc.mathematics.integrators import join
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.recording import observed, row_of
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.signals import Layout
 
@@ -79,7 +80,7 @@ def call(tape: ca.Function, places: Mapping[str, str]) -> str:
     return f"{tape.name()}({', '.join(places[name] for name in (*tape.name_in(), *tape.name_out()))})"
 
 
-def build(mission: Mission, scheme: Scheme) -> Tapes:
+def tapes_of(mission: Mission, scheme: Scheme) -> Tapes:
     """Return all tapes of a scheme in the mission's mode."""
     loop = Loop(mission, scheme)
     s, plant, timing, symbolic = loop.symbols(), mission.truth, mission.timing, scheme.actuation.is_symbolic
@@ -115,17 +116,17 @@ def build(mission: Mission, scheme: Scheme) -> Tapes:
             slope = ca.vertcat(loop.moved(s.t, s.x, s.actuators, s.noise), flowing)
             tapes["flow"] = function("flow", {**s.ports("t", "x"), **sample, "noise": s.noise}, {"slope": slope})
         tapes.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
-    tally, fold = metrics.fold(tuple(mission.metrics), loop.row)
+    tally, fold = metrics.fold(tuple(mission.metrics), row_of(loop))
     tapes["tally"] = fold
     tapes["start"] = function("start", s.ports("y"), {"m": loop.started(ca.SX(0), s.y)})
-    return Tapes(tapes, loop.row, tally, symbolic)
+    return Tapes(tapes, row_of(loop), tally, symbolic)
 
 
 def _observe(loop: Loop) -> ca.Function:
     """Return the tape that lays out one row of the record, status bits completed."""
     s = loop.symbols()
     flags, report = ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report")
-    row = loop.observed(s, flags, report)
+    row = observed(loop, s, flags, report)
     given = {**s.ports("t", "x"), "accepted": s.y, "memory": s.m, **s.ports("wanted", "limited")}
     return function("observe", {**given, "told": s.actuators, "flags": flags, "report": report}, {"row": row})
 

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import GncError, LawError, ProblemError
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import asking, fitting
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
-from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.origin import Origin
+from casadi_gnc.missions.parts import actuation_of, belief_of, plant_of, start_of
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.timing import Noise, Timing
 from casadi_gnc.problem_files.document import Complaints
@@ -41,7 +44,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     document, common, craft = checked.document, checked.common, checked.craft
     complaints = Complaints(document)
     parts = _Parts(craft)
-    with complaints.about("spacecraft"):
+    with complaints.about("spacecraft", "model"):
         parts.ask()
     complaints.settle()
     for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
@@ -67,7 +70,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
             further.append(CHECKS.find(name, document.folder))
     complaints.settle()
     made = None
-    with complaints.about("spacecraft"):
+    with _about_parts(complaints, [table.name for table, _, _ in checked.schemes]):
         made = Mission(
             craft,
             schemes,
@@ -94,6 +97,18 @@ def with_origin(made: Mission, origin: Origin) -> Mission:
     return replace(made, origin=origin)
 
 
+@contextmanager
+def _about_parts(complaints: Complaints, schemes: list[str]) -> Iterator[None]:
+    """Note what a mission refuses: of a scheme's law at that scheme, all else at the craft."""
+    try:
+        yield
+    except LawError as error:
+        place = ("scheme", schemes.index(error.scheme), "law", "type") if error.scheme else ("spacecraft", "model")
+        complaints.add(place, str(error))
+    except GncError as error:
+        complaints.add(("spacecraft", "model"), str(error))
+
+
 class _Parts:
     """Ask a craft once for what building a mission needs of it."""
 
@@ -102,20 +117,16 @@ class _Parts:
 
     def ask(self) -> None:
         """Ask for plant, start and belief."""
-        craft = self.craft
-        self.plant, self.believed = asking.plant_of(craft), asking.ask(craft, "belief")
-        start = asking.ask(craft, "start")
-        self.known = set(start) == set(self.plant.state.names)  # else the mission says what is wrong
-        self.measured: list[float] = []
-        if self.known:
-            x = ca.vertcat(*(ca.DM(start[name]) for name in self.plant.state.names))
-            quiet = ca.DM.zeros(self.plant.noise.size)
-            self.measured = list(np.array(ca.DM(self.plant.measure(0.0, x, quiet))).ravel())
+        self.plant, self.believed = plant_of(self.craft), belief_of(self.craft)
+        start = start_of(self.craft, self.plant)
+        x = ca.vertcat(*(ca.DM(start[name]) for name in self.plant.state.names))
+        quiet = ca.DM.zeros(self.plant.noise.size)
+        told = asking.ask(self.plant, "measure", 0.0, x, quiet)
+        seen = asking.column(self.plant, "measure", told, self.plant.measurement)
+        self.measured = list(np.array(ca.DM(seen)).ravel())
 
     def incredible(self) -> Iterator[MisfitError]:
         """Yield starts that the sensors could not measure: a controller has no good value before them."""
-        if not self.known:
-            return
         layout = self.plant.measurement
         for signal in layout.signals:
             largest = max((abs(value) for value in self.measured[layout.place(signal.name)]), default=0.0)
@@ -173,7 +184,7 @@ def _scheme(
     """Return a scheme; a `MisfitError` or a `GncError` says what does not fit."""
     own = type(parts.craft).scheme_keys
     keys = own.model_construct(**{name: getattr(table, name) for name in own.model_fields})
-    actuation = asking.ask(parts.craft, "actuation", keys)
+    actuation = actuation_of(parts.craft, keys)
     why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
     if why:
         told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"

@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from casadi_gnc.errors import GncError, ProblemError
 from casadi_gnc.problem_files import toml_place
 from casadi_gnc.system import assets
+from casadi_gnc.system.text import refused
 from casadi_gnc.tables.complaints import sentences
 from casadi_gnc.tables.part import MisfitError
 
@@ -127,6 +128,14 @@ def read(problem: str | Path) -> Document:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
+    character = refused(text)  # in a comment too: the file travels with the packages that are made of it
+    if character:
+        number = next(k for k, line in enumerate(text.split("\n"), 1) if refused(line))
+        raise ProblemError(
+            f"holds the character {character}, which is invisible and can change what a reader takes the rest for; "
+            "leave it out",
+            f"{path.name}, line {number}",
+        )
     return Document(path, text, parsed(text, path))
 
 

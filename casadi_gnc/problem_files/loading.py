@@ -19,7 +19,8 @@ from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.laws import Law
 from casadi_gnc.missions.craft import REGISTRY as CRAFTS
 from casadi_gnc.missions.craft import Craft
-from casadi_gnc.missions.mission import Mission, Origin
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.origin import Origin
 from casadi_gnc.problem_files import building
 from casadi_gnc.problem_files.changing import changed
 from casadi_gnc.problem_files.document import Complaints, Document, read_kind
@@ -139,7 +140,7 @@ def _craft(kind: type[Craft], data: dict[str, Any], own: list[str], complaints: 
 
 
 @lru_cache(maxsize=64)
-def scheme_table(kind: type[Craft]) -> type[SchemeTable]:
+def scheme_table(kind: type[Craft]) -> Any:
     """Return the model of a [[scheme]] that flies a craft."""
     return create_model("Scheme", __base__=(SchemeTable, kind.scheme_keys), __doc__=SchemeTable.__doc__)
 

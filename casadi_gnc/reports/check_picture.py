@@ -8,6 +8,7 @@ from pathlib import Path
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.system.files import write_beside
+from casadi_gnc.system.text import picture
 
 #: Colours told apart with every kind of colour vision; each verdict has a mark of its own too.
 _LOOK = {"ok": ("#009E73", "o"), "note": ("#56B4E9", "s"), "warn": ("#E69F00", "^"), "fail": ("#D55E00", "X")}
@@ -45,7 +46,7 @@ def draw(title: str, checks: list[Check], target: Path) -> None:
     axes.set_xlim(_ENDS[0] / 1.5, _ENDS[1] * 1.5)
     axes.axvline(1.0, color="0.3", linestyle="--", linewidth=1.2)
     axes.set_xlabel("share of the limit used [-]")
-    axes.set_title(title.replace("$", r"\$"), fontsize=12, loc="left")
+    axes.set_title(picture(title), fontsize=12, loc="left")
     axes.grid(axis="x", color="0.9")
     axes.spines[["top", "right"]].set_visible(False)
     for verdict, (colour, mark) in _LOOK.items():

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.loop import funnel_signals
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.system.files import write_beside
+from casadi_gnc.system.text import picture
 
 #: Okabe and Ito's colours, told apart with every kind of colour vision.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -36,7 +37,7 @@ def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
     for panel, each in zip(panels, axes, strict=True):
         draw[panel.kind](each, mission, flight, panel)
     figure.suptitle(
-        _plain(f"{mission.title}\n{flight.title}" if mission.title else flight.title),
+        picture(f"{mission.title}\n{flight.title}" if mission.title else flight.title),
         fontsize=_FONT + 1,
         x=0.02,
         ha="left",
@@ -72,13 +73,13 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
     for each, (signal, label, level, told) in zip(axes, wanted, strict=True):
         for colour, flight in zip(COLOURS, flights, strict=False):
             size = np.abs(flight.block(signal)).max(axis=1)
-            title = _plain(flight.title) if each is axes[0] else None
+            title = picture(flight.title) if each is axes[0] else None
             each.semilogy(*_thin(flight.time, np.maximum(size, 1e-12)), color=colour, label=title, linewidth=1.8)
         if level is not None:
             each.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=told)
         each.set_ylabel(label if len(wanted) == 1 else "\n".join(textwrap.wrap(label, 22)))
     axes[-1].set_xlabel("time [s]")
-    axes[0].set_title(_plain(mission.title), fontsize=_FONT + 1, loc="left")
+    axes[0].set_title(picture(mission.title), fontsize=_FONT + 1, loc="left")
     figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)
     return _save(figure, folder / "comparison.png")
 
@@ -118,11 +119,6 @@ def _legend(axes: Any, columns: int) -> None:
         ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 0.98), fontsize=_FONT - 1, frameon=False,
         handlelength=1.4, columnspacing=1.2, borderaxespad=0.1,
     )  # fmt: skip
-
-
-def _plain(text: str) -> str:
-    """Return text that matplotlib does not take for mathematics."""
-    return text.replace("$", r"\$")
 
 
 def _thin(time: np.ndarray, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,3 +2,5 @@
 
 Each is a Python file with the words `Starter` and `starter` in the place of the name, and a mission that flies it.
 """
+
+__all__: list[str] = []

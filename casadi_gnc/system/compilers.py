@@ -2,12 +2,13 @@
 
 Libraries are cached in the user's cache folder under the hash of everything that went into them:
 source, headers, flags and the compiler's own version. A library is built beside its final name and
-renamed, so an interrupted build leaves no broken entry.
+renamed, so an interrupted build leaves no broken entry. Where that folder cannot serve, another does
+(`casadi_gnc.system.folders`).
 """
 
 from __future__ import annotations
 
-import atexit
+import contextlib
 import ctypes
 import hashlib
 import os
@@ -22,12 +23,23 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import platformdirs
-
 from casadi_gnc.errors import CompilerError, NoCompilerError
+from casadi_gnc.system import folders
+from casadi_gnc.system.folders import CACHE_VARIABLE, cache_folder, workshop
 
-#: Overrides the cache folder.
-CACHE_VARIABLE = "CASADI_GNC_CACHE"
+__all__ = [
+    "CACHE_VARIABLE",
+    "Compiler",
+    "available",
+    "cache_folder",
+    "compile_in",
+    "compiled",
+    "different",
+    "find",
+    "load",
+    "open_library",
+    "workshop",
+]
 #: -ffp-contract=off: no fused operation, so every compiler rounds alike.
 FLAGS = ("-std=c99", "-ffp-contract=off", "-fPIC", "-shared")
 
@@ -43,6 +55,22 @@ class Compiler:
     def name(self) -> str:
         """Short name for messages."""
         return Path(self.command[0]).name
+
+    @property
+    def identity(self) -> str:
+        """What tells it from another: its version without the name that it was called by, or else its real file.
+
+        `cc` and `gcc` that are one program say the same but for that name; programs behind one wrapper (ccache, a
+        chooser) have one file and say different things.
+        """
+        said = self.version.removeprefix(self.name).strip()
+        known = any(character.isdigit() for character in said)
+        return said if known else os.path.realpath(shutil.which(self.command[0]) or self.command[0])
+
+
+def different(found: list[Compiler]) -> list[Compiler]:
+    """Return the compilers that are not the same program under another name; of each the first."""
+    return list({compiler.identity: compiler for compiler in reversed(found)}.values())[::-1]
 
 
 def _chosen() -> tuple[str, ...] | None:
@@ -104,13 +132,7 @@ def find() -> Compiler:
     return found[0]
 
 
-def cache_folder() -> Path:
-    """Return the folder of compiled libraries; it may not exist yet."""
-    chosen = os.environ.get(CACHE_VARIABLE, "").strip()
-    return Path(chosen).resolve() if chosen else Path(platformdirs.user_cache_dir("casadi-gnc"))
-
-
-def build(
+def compiled(
     source: str,
     *,
     include: Path,
@@ -141,63 +163,98 @@ def build(
     for part in (source, *texts, *FLAGS, *flags, *compiler.command, compiler.version, *machine):
         key.update(part.encode())
         key.update(b"\0")
-    folder = _writable(cache_folder())
-    library = folder / f"{key.hexdigest()[:32]}{'.dll' if os.name == 'nt' else '.so'}"
-    if library.exists():
-        return library
-    with tempfile.TemporaryDirectory(dir=folder, prefix="build-") as workshop:
-        unit = Path(workshop) / "unit.c"
+    name = f"{key.hexdigest()[:32]}{'.dll' if os.name == 'nt' else '.so'}"
+    troubles = []
+    for find_folder in (cache_folder, folders.private_folder):
+        folder = find_folder()
+        if (folder / name).exists() and not folders.forbids_running(folder):
+            return folder / name
+        found = folders.trouble(folder)
+        if found is None:
+            try:
+                return _built(folder / name, source, units, compiler, (*FLAGS, *flags, f"-I{include}"), include)
+            except _NoRoomError:  # the other folder may be on another disk
+                found = "has no space left"
+            except OSError as error:
+                found = f"cannot be written ({folders.reason(error)})"
+        troubles.append(f"{folder} {found}")
+    raise CompilerError(f"compiled libraries have no folder: {'; '.join(troubles)}; {folders.remedy(None)}")
+
+
+class _NoRoomError(CompilerError):
+    """A folder without space."""
+
+
+def _built(
+    library: Path, source: str, units: tuple[str, ...], compiler: Compiler, flags: tuple[str, ...], include: Path
+) -> Path:
+    """Build a library beside its place, and put it there."""
+    with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-", ignore_cleanup_errors=True) as shop:
+        unit, product = Path(shop) / "unit.c", Path(shop) / library.name
         unit.write_text(source, encoding="utf-8")
-        product = Path(workshop) / library.name
         sources = [str(unit), *(str(include / name) for name in units)]
-        command = [*compiler.command, *FLAGS, *flags, f"-I{include}", "-o", str(product), *sources, "-lm"]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=600)
-        except (OSError, subprocess.SubprocessError) as error:
-            raise CompilerError(f"{compiler.name} could not be run: {error}") from error
-        if done.returncode or not product.is_file():
-            raise CompilerError(f"{compiler.name} refused the generated source: {_first_complaint(done.stderr)}")
+        compile_in(Path(shop), compiler, [*flags, "-o", str(product), *sources, "-lm"], "the generated source")
         with product.open("rb") as file:
             os.fsync(file.fileno())
         os.replace(product, library)
     return library
 
 
+def compile_in(shop: Path, compiler: Compiler, words: list[str], what: str) -> None:
+    """Run a compiler, whose own temporary files go to `shop`.
+
+    Parameters
+    ----------
+    words : its arguments, with `-o` and a file.
+    what : is compiled, for the message.
+
+    Raises
+    ------
+    CompilerError
+        If it cannot be run, refuses (with its first complaint), or the disk is full.
+    """
+    product = Path(words[words.index("-o") + 1])
+    # Complaints in English, whatever the user's language: they are looked through for their cause.
+    environment = {**os.environ, "TMPDIR": str(shop), "LC_ALL": "C"}
+    if not environment.get("HOME"):
+        environment.setdefault("ZIG_GLOBAL_CACHE_DIR", str(shop))
+    try:
+        done = subprocess.run(
+            [*compiler.command, *words], capture_output=True, text=True, errors="replace", timeout=600, env=environment
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        raise CompilerError(f"{compiler.name} could not be run: {error}") from error
+    if done.returncode or not product.is_file():
+        full = folders.out_of_room(done.stderr, shop.parent)
+        if full:
+            raise _NoRoomError(full)
+        raise CompilerError(f"{compiler.name} refused {what}: {_first_complaint(done.stderr)}")
+
+
 def load(source: str, **options: Any) -> ctypes.CDLL:
-    """Return a built library, loaded; arguments as for `build`.
+    """Return a built library, loaded; arguments as for `compiled`.
 
     A cached file that cannot be loaded (cut short by a full disk, say) is built once more.
     """
-    path = build(source, **options)
+    path = compiled(source, **options)
     try:
         return ctypes.CDLL(str(path))
     except OSError:
-        path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+    return open_library(compiled(source, **options))
+
+
+def open_library(path: Path) -> ctypes.CDLL:
+    """Return a library, loaded; raise `CompilerError` that says which folder is in the way."""
     try:
-        return ctypes.CDLL(str(build(source, **options)))
+        return ctypes.CDLL(str(path))
     except OSError as error:
-        raise CompilerError(f"the library just built cannot be loaded: {error}") from error
+        raise CompilerError(
+            f"the library just built in {path.parent} cannot be loaded: {error}; {folders.remedy(None)}"
+        ) from None
 
 
 def _first_complaint(text: str) -> str:
     lines = [line for line in text.splitlines() if "error" in line] or text.splitlines()
     return lines[0].strip() if lines else "no message"
-
-
-def _writable(folder: Path) -> Path:
-    """Return `folder`, made if need be, or a private temporary one where it cannot be written."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass
-    return _private_folder()
-
-
-@lru_cache
-def _private_folder() -> Path:
-    """Return a folder that lasts as long as the process."""
-    folder = tempfile.TemporaryDirectory(prefix="casadi-gnc-", ignore_cleanup_errors=True)
-    atexit.register(folder.cleanup)
-    return Path(folder.name)

@@ -1,1 +1,36 @@
-"""What the tables of a problem file are made of: numbers with ranges, matrices, parts that several crafts share."""
+"""What the tables of a problem file are made of: numbers with ranges, and parts that several crafts share."""
+
+from casadi_gnc.tables.allocation import BackEndName, Pinv, Robust
+from casadi_gnc.tables.attitude import AttitudeStart
+from casadi_gnc.tables.disturbances import OrbitalPush, OrbitAndTorque, OuterForce
+from casadi_gnc.tables.limits import ForceAndTorqueLimits
+from casadi_gnc.tables.matrices import Inertia
+from casadi_gnc.tables.orientation import Orientation
+from casadi_gnc.tables.part import Matrix, MisfitError, NonNegative, Part, Positive, Rows, Vector, table
+from casadi_gnc.tables.thrusters import Engine, MountedThrusters, Thrusters
+from casadi_gnc.tables.wheels import Wheels
+
+__all__ = [
+    "AttitudeStart",
+    "BackEndName",
+    "Engine",
+    "ForceAndTorqueLimits",
+    "Inertia",
+    "Matrix",
+    "MisfitError",
+    "MountedThrusters",
+    "NonNegative",
+    "OrbitAndTorque",
+    "OrbitalPush",
+    "Orientation",
+    "OuterForce",
+    "Part",
+    "Pinv",
+    "Positive",
+    "Robust",
+    "Rows",
+    "Thrusters",
+    "Vector",
+    "Wheels",
+    "table",
+]

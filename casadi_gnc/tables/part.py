@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from casadi_gnc.system.text import refused
 
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
 Rows = Annotated[list[Vector], Field(min_length=1)]
@@ -25,6 +27,17 @@ class Part(BaseModel):
     """Base of all parts of a file."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _can_be_read(cls, value: Any) -> Any:
+        for text in value if isinstance(value, list) else [value]:
+            if isinstance(text, str) and (character := refused(text)):
+                raise ValueError(
+                    f"holds the character {character}, which is invisible and can change what a reader, a terminal or "
+                    "a compiler takes the rest for; leave it out"
+                )
+        return value
 
 
 class MisfitError(ValueError):

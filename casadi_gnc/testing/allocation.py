@@ -90,18 +90,17 @@ def _check_closed_form(backend: Any, robust: bool) -> None:
 def _check_sequence(backend: Any, generator: np.random.Generator) -> None:
     """Whatever is kept from the last sample must not spoil the next, nor another allocator."""
     name, problem = backends.name_of(backend), _random_problem(generator, False)
-    one, other = Allocator(problem, backend), Allocator(problem, backend)
-    for k in range(10):
-        command = np.array([0.5 * np.cos(0.2 * k), 0.4 * np.cos(0.3 * k + 1), 0.3 * np.cos(0.1 * k)])
-        first = one.solve(command)
+    commands = [np.array([0.5 * np.cos(0.2 * k), 0.4 * np.cos(0.3 * k + 1), 0.3 * np.cos(0.1 * k)]) for k in range(10)]
+    alone, one, other = (Allocator(problem, backend) for _ in range(3))
+    quiet = [alone.solve(command).forces for command in commands]
+    disturbed = []
+    for command in commands:
+        disturbed.append(one.solve(command).forces)
         other.solve(-command)
-        lower, upper = problem.lower, problem.upper
-        must(np.all((lower <= first.forces) & (first.forces <= upper)), f"{name}: sample {k + 1} leaves the bounds")
-    again = Allocator(problem, backend)
-    for k in range(10):
-        command = np.array([0.5 * np.cos(0.2 * k), 0.4 * np.cos(0.3 * k + 1), 0.3 * np.cos(0.1 * k)])
-        second = again.solve(command)
-    near = np.allclose(first.forces, second.forces, rtol=0, atol=1e-6 * float(problem.upper.max()))
+    for k, forces in enumerate(quiet, 1):
+        inside = np.all((problem.lower <= forces) & (forces <= problem.upper))
+        must(inside, f"{name}: sample {k} of a sequence leaves the bounds")
+    near = np.allclose(quiet, disturbed, rtol=0, atol=1e-6 * float(problem.upper.max()))
     must(near, f"{name}: the same commands give other forces where another allocator works beside")
 
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from casadi_gnc.checking import check
 from casadi_gnc.missions import fitting, tapes
-from casadi_gnc.missions.engines import CompiledEngine, VirtualMachineEngine
+from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
+from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.testing.asserting import must
 from casadi_gnc.testing.law import check_law
@@ -32,7 +33,7 @@ def check_craft(mission: Mission) -> None:
     name = type(craft).__name__
     must(craft.__doc__, f"{name} has no docstring: catalogues show its first line")
     must(dict(craft.start()) == dict(craft.start()), f"{name}.start differs from call to call")
-    names = {signal for each in tapes.build(mission, scheme).row.names for signal in [each]}
+    names = {signal for each in tapes.tapes_of(mission, scheme).row.names for signal in [each]}
     for panel in craft.panels(mission):
         known = names | set(scheme.actuation.effort.names)
         must(panel.signal in known, f"{name}.panels shows {panel.signal!r}, which is not recorded")
@@ -67,7 +68,7 @@ def check_mission(mission: Mission) -> None:
 def _check_words(mission: Mission) -> None:
     """With the C library's functions the compiled C and CasADi's machine write the same words."""
     scheme = mission.scheme()
-    built, records = tapes.build(mission, scheme), []
+    built, records = tapes.tapes_of(mission, scheme), []
     compiled = CompiledEngine(mission, scheme, built, "libm", optimise="-O0")
     for engine in (compiled, VirtualMachineEngine(mission, scheme, built)):
         carried, record = begin(mission, built, engine), np.zeros((_SAMPLES, built.row.size))

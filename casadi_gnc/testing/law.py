@@ -10,6 +10,7 @@ import numpy as np
 from casadi_gnc.laws import Law, advance, gains_of
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.recording import observed
 from casadi_gnc.testing.asserting import must, numbers
 
 #: A hold so short that what a law does over it is its rate, [s].
@@ -63,7 +64,7 @@ def _check_sizes(loop: Loop, law: Law, y: ca.DM) -> None:
     s = held.symbols()
     held.before(s.t, s.y, s.good, s.m, s.actuators)
     held.advanced(0.0, y, memory, wanted, wanted)
-    held.observed(s, ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report"))
+    observed(held, s, ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report"))
 
 
 def _check_short_hold(law: Law, y: ca.DM) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.delivery.verifying import verify
-from casadi_gnc.embedded import targets
+from casadi_gnc.embedded import boards
 from casadi_gnc.testing.asserting import must
 
 
@@ -22,7 +22,7 @@ def check_target(target: Any, problem: Any = "huang2020/detumble", steps: int = 
     ContractError, TargetError
         Saying what is not kept, or which tool is missing.
     """
-    board = targets.find(target)
+    board = boards.find(target)
     board.need()
     with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as place:
         folder = Path(place) / "package"

@@ -7,3 +7,7 @@ A craft's folder has
 * `craft.py`: the `casadi_gnc.Craft`, made of its tables;
 * `checks.py`, where there is more to say before it flies than for every craft.
 """
+
+from casadi_gnc.vehicles import combined_spacecraft, docking_pair, drag_free_pair, proximity_pair, wheel_spacecraft
+
+__all__ = ["combined_spacecraft", "docking_pair", "drag_free_pair", "proximity_pair", "wheel_spacecraft"]

@@ -21,6 +21,12 @@
 #endif
 
 #include "gnc_allocate.h"
+#include "gnc_arithmetic.h"
+
+#if !defined(GNC_ALLOC_REAL_FLOAT)
+/* -fsingle-precision-constant defines no macro: it makes the size of this array negative. */
+typedef char gnc_alloc_constants_must_be_doubles_[(sizeof(1.0) == sizeof(double)) ? 1 : -1];
+#endif
 
 enum {
     N = GNC_ALLOC_N,                        /* actuators */

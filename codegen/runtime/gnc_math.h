@@ -39,6 +39,9 @@
 
 #include "gnc_mathf.h"
 
+/* -fsingle-precision-constant defines no macro: it makes the size of this array negative. */
+typedef char gnc_constants_must_be_doubles_[(sizeof(1.0) == sizeof(double)) ? 1 : -1];
+
 /* ---- Building blocks ------------------------------------------------------------------------------- */
 
 typedef struct {

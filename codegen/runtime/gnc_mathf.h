@@ -13,12 +13,7 @@
 
 #include <stdint.h>
 
-#if defined(__FAST_MATH__)
-#error "gnc_math needs IEEE arithmetic: build without -ffast-math"
-#endif
-#if defined(__FLT_EVAL_METHOD__) && __FLT_EVAL_METHOD__ != 0
-#error "gnc_math needs arithmetic in the declared precision: FLT_EVAL_METHOD 0 (on x86: -msse2 -mfpmath=sse)"
-#endif
+#include "gnc_arithmetic.h"
 
 #ifndef GNC_INLINE
 #define GNC_INLINE static inline

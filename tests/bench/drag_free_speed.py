@@ -48,7 +48,7 @@ def in_turn(peers: dict[str, Callable[[], object]], rounds: int, period: float =
 def compiled(maths: str) -> Callable[[], np.ndarray]:
     """Return the flight as one C call that gives the position at the end."""
     scheme = MISSION.scheme(SCHEME)
-    built = tapes.build(MISSION, scheme)
+    built = tapes.tapes_of(MISSION, scheme)
     engine = CompiledEngine(MISSION, scheme, built, maths)
     record = np.zeros((SAMPLES, built.row.size))
     fresh = begin(MISSION, built, engine)

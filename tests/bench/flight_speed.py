@@ -44,7 +44,7 @@ def shortest(run: Callable[[], object], times: int) -> float:
 def compiled(maths: str) -> Callable[[], np.ndarray]:
     """Return a whole flight as one C call, every sample recorded."""
     scheme = MISSION.scheme(SCHEME)
-    built = tapes.build(MISSION, scheme)
+    built = tapes.tapes_of(MISSION, scheme)
     engine = CompiledEngine(MISSION, scheme, built, maths)
     record = np.zeros((SAMPLES, built.row.size))
 

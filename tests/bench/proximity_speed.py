@@ -46,7 +46,7 @@ def timed(run: Callable[[], np.ndarray], times: int) -> tuple[float, np.ndarray]
 def compiled(maths: Literal["gnc", "libm"]) -> Callable[[], np.ndarray]:
     """Return a whole flight as one C call, every sample recorded."""
     scheme = MISSION.scheme(SCHEME)
-    built = tapes.build(MISSION, scheme)
+    built = tapes.tapes_of(MISSION, scheme)
     engine = CompiledEngine(MISSION, scheme, built, maths)
     record, fresh = np.zeros((SAMPLES, built.row.size)), begin(MISSION, built, engine)
 

@@ -75,6 +75,7 @@ def test_a_back_end_that_breaks_a_bound_by_a_millionth_and_claims_success_is_cau
     assert fastest in ("clarabel", bad("MODEST"))
 
 
+@pytest.mark.slow
 def test_one_that_hangs_dies_or_leaves_takes_nothing_along(four, tmp_path):
     chosen = ["clarabel", bad("HANGS"), bad("DIES"), bad("LEAVES"), bad("RAISES"), bad("REFUSES")]
     results = run("allocation", [four], tmp_path / "out", contestants=chosen, settings=QUICK)

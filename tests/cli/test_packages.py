@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from packages import copied, made, need_target, run
+from packages import copied, made, needs_target, run
 
 
 def command(*words, **environment):
@@ -45,8 +45,8 @@ def test_generate_make_verify(tmp_path):
     assert text.endswith("</html>\n")
 
 
+@needs_target("cortex-m4f")
 def test_verify_on_a_target(tmp_path):
-    need_target("cortex-m4f")
     page = tmp_path / "verify.html"
     folder = made("huang2020/slew", "funnel_pinv", "float32")
     done = command("verify", folder, "--target", "host,cortex-m4f", "--report", page)
@@ -57,8 +57,8 @@ def test_verify_on_a_target(tmp_path):
     assert "Cortex-M4F" in page.read_text()
 
 
+@needs_target("cortex-m7")
 def test_numbers_of_a_target_reach_the_readme(tmp_path):
-    need_target("cortex-m7")
     folder = tmp_path / "flight"
     done = command("generate", "huang2020/slew", "--out", folder, "--target", "cortex-m7")
     assert done.returncode == 0, done.stderr
@@ -129,3 +129,32 @@ def test_missing_target_is_one_sentence(tmp_path):
     assert done.returncode == 2
     assert "rv64 needs riscv64-unknown-elf-gcc and qemu-system-riscv64" in done.stderr
     assert "make targets" in done.stderr
+
+
+def test_texts_of_strangers_do_not_reach_the_terminal(tmp_path):
+    """A package's manifest comes with the package, and may have been written by anybody."""
+    folder = copied(made("huang2020/slew", "pd_pinv"), tmp_path)
+    manifest = folder / "manifest.json"
+    about = json.loads(manifest.read_text())
+    manifest.write_text(json.dumps({**about, "title": "\x1b[2Jevil\u202e"}))
+    page = tmp_path / "page.html"
+    done = command("verify", folder, "--report", page)
+    assert "<U+001B>[2Jevil<U+202E>, scheme pd_pinv" in done.stdout
+    for said in (done.stdout, page.read_text()):
+        assert "\x1b" not in said
+        assert "\u202e" not in said
+
+
+def test_a_terminal_of_few_letters(tmp_path):
+    """A title in another script at a terminal that cannot show it: the letters' numbers, no traceback."""
+    from casadi_gnc.system import assets
+
+    text = (assets.folder("problems") / "huang2020" / "slew.toml").read_text(encoding="utf-8")
+    lines = ['title = "\u59ff\u52e2"' if line.startswith("title =") else line for line in text.splitlines()]
+    (tmp_path / "slew.toml").write_text("\n".join(lines), encoding="utf-8")
+    words = ("--scheme", "pd_pinv", "--steps", 40, "--out", tmp_path / "my dir")
+    done = command("generate", tmp_path / "slew.toml", *words, PYTHONIOENCODING="latin-1", PYTHONUTF8="0")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("\\u59ff\\u52e2, scheme pd_pinv")
+    line = done.stdout.splitlines()[-1].removeprefix("next: ").split("; ")[0]
+    assert run("sh", "-c", line).returncode == 0  # a folder with a space in its name, as printed

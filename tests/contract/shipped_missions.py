@@ -2,6 +2,8 @@
 
 from functools import cache
 
+import pytest
+
 import casadi_gnc
 from casadi_gnc.laws import REGISTRY, Law
 from casadi_gnc.missions.mission import Mission
@@ -13,6 +15,13 @@ from casadi_gnc.problem_files.document import read, shipped
 def missions() -> dict[str, Mission]:
     """Return all shipped missions by name, loaded once."""
     return {name: casadi_gnc.load(name, strict=False) for name in shipped() if read(name).data["kind"] == "mission"}
+
+
+def parametrized(cases: list[tuple[str, ...]]) -> list:
+    """Return cases that begin with the name of a mission; all are slow but those of one mission of each paper."""
+    names = sorted((name for name in missions() if "as_printed" not in name), reverse=True)
+    fast = set({name.split("/")[0]: name for name in names}.values())
+    return [pytest.param(*case, marks=[] if case[0] in fast else pytest.mark.slow) for case in cases]
 
 
 @cache

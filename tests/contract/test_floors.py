@@ -72,6 +72,15 @@ def test_files_stay_one_idea_long(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
 
 
+@pytest.mark.parametrize("folder", sorted(path.parent for path in ROOT.rglob("__init__.py")), ids=lambda p: p.name)
+def test_every_room_has_a_public_face(folder):
+    name = ".".join(["casadi_gnc", *folder.relative_to(ROOT).parts])
+    face = importlib.import_module(name)
+    assert face.__doc__
+    for each in face.__all__:
+        assert getattr(face, each) is not None, f"{name}.{each}"
+
+
 def test_the_front_door_leads_somewhere():
     for name in casadi_gnc.__all__:
         assert getattr(casadi_gnc, name) is not None

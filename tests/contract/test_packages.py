@@ -1,7 +1,6 @@
 """Every shipped law with every allocation becomes C that strict compilers take and CasADi's machine repeats."""
 
 import re
-import shutil
 
 import numpy as np
 import pytest
@@ -64,11 +63,10 @@ DEVIATIONS = {
 }
 
 
+@pytest.mark.tools("cppcheck")
 @pytest.mark.parametrize("real", ["float64", "float32"])
 def test_generated_code_keeps_the_misra_rules(real, tmp_path):
     """cppcheck's MISRA C:2012 add-on on what we generate; the files of the runtime have their own gate."""
-    if shutil.which("cppcheck") is None:
-        pytest.fail("cppcheck is not installed")
     gains = ("rate_gain", "observer_gain")
     folder = copied(made("huang2020/detumble", "observer_robust", real, gains, steps=64), tmp_path)
     done = run(

@@ -38,7 +38,7 @@ def test_section(section, tmp_path):
 def test_every_kind_has_a_registry_of_its_own():
     """The groups of the table are those that the library asks for."""
     from casadi_gnc.allocation import backends
-    from casadi_gnc.embedded import targets
+    from casadi_gnc.embedded import boards as targets
     from casadi_gnc.laws import REGISTRY as LAWS
     from casadi_gnc.missions import checks, craft, engines
     from casadi_gnc.problem_files import synthesis_recipes

@@ -5,7 +5,7 @@ import re
 import pytest
 from running_pages import ROOT, run, sections
 
-from casadi_gnc.embedded import targets
+from casadi_gnc.embedded import boards as targets
 
 PAGE = "first_law.md"
 SECTIONS = [

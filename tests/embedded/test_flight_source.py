@@ -25,7 +25,7 @@ FLIGHTS = [
 def test_strict_compilers_have_nothing_to_say(compiler, problem, scheme, mode, maths, tmp_path):
     mission = casadi_gnc.load(problem).with_timing(mode=mode)
     chosen = mission.scheme(scheme)
-    built = tapes.build(mission, chosen)
+    built = tapes.tapes_of(mission, chosen)
     unit = tmp_path / "flight.c"
     unit.write_text(flight_source(mission, chosen, built, maths))
     flags = [] if built.symbolic else list(online.flags(chosen.actuation.allocator.problem))
@@ -44,7 +44,7 @@ def test_source_is_the_same_every_time():
     for _ in range(2):
         mission = casadi_gnc.load("huang2020/slew")
         chosen = mission.scheme("funnel_robust")
-        texts.append(flight_source(mission, chosen, tapes.build(mission, chosen)))
+        texts.append(flight_source(mission, chosen, tapes.tapes_of(mission, chosen)))
     assert texts[0] == texts[1]
     assert "MIT-0" in texts[0]
 
@@ -55,7 +55,7 @@ def test_one_gain_changes_only_constants():
     lines = []
     for one in (mission, changed):
         chosen = one.scheme("observer_pinv")
-        lines.append(flight_source(one, chosen, tapes.build(one, chosen)).splitlines())
+        lines.append(flight_source(one, chosen, tapes.tapes_of(one, chosen)).splitlines())
     assert len(lines[0]) == len(lines[1])
     different = [(a, b) for a, b in zip(*lines, strict=True) if a != b]
     assert different

@@ -5,10 +5,11 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import platform
 import re
-import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +24,6 @@ from math_functions import (
     Library,
     Precision,
     build_all,
-    builds_of,
-    by_name,
     compiler,
     is_gnu,
     loops_source,
@@ -32,13 +31,20 @@ from math_functions import (
 )
 from math_truth import SPECIAL, any_finite, arguments
 
+#: Compilers beyond the first, each by a test of its own where it is installed.
+CLANG, PLUS, CLANG_PLUS = (pytest.param(name, marks=pytest.mark.tools(name)) for name in ("clang", "g++", "clang++"))
 #: The zig compiler is asked where its wheel is installed.
-COMPILERS = ["gcc", "clang", *(["zig"] if zig() else [])]
+COMPILERS = ["gcc", CLANG, *(["zig"] if zig() else [])]
+
+
+#: Of a compiler's name: label to library.
+Builds = Callable[[str], dict[str, Path]]
 
 
 @pytest.fixture(scope="module")
-def builds(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    return build_all(tmp_path_factory.mktemp("gnc_math"), COMPILERS)
+def builds(tmp_path_factory: pytest.TempPathFactory) -> Builds:
+    folder = tmp_path_factory.mktemp("gnc_math")
+    return functools.cache(lambda name: build_all(folder, name))
 
 
 # ---- The same bits everywhere -------------------------------------------------------------------------------
@@ -70,21 +76,17 @@ def digests(path: Path) -> dict[str, str]:
 
 
 @pytest.fixture(scope="module")
-def reference_digests(builds: dict[str, Path]) -> dict[str, str]:
-    label = "gcc-O0" if "gcc-O0" in builds else "clang-O0"
-    return digests(builds[label])
+def reference_digests(builds: Builds) -> dict[str, str]:
+    return digests(builds("gcc")["gcc-O0"])
 
 
 @pytest.mark.parametrize("name", COMPILERS)
-def test_every_build_gives_the_same_bits(builds: dict[str, Path], name: str, request: pytest.FixtureRequest):
-    if name != "zig":
-        compiler(name)
-    reference = request.getfixturevalue("reference_digests")
-    for label in builds_of(name):
-        assert digests(builds[label]) == reference, f"{label} differs from the unoptimised scalar build"
+def test_every_build_gives_the_same_bits(builds: Builds, name: str, reference_digests: dict[str, str]):
+    for label, library in builds(name).items():
+        assert digests(library) == reference_digests, f"{label} differs from the unoptimised scalar build"
 
 
-def test_gcc_vectorises_every_function(builds: dict[str, Path]):
+def test_gcc_vectorises_every_function(builds: Builds):
     """Branch-free in fact and not only in intention: a data-dependent jump would stop the vectoriser.
 
     Plain SSE2 cannot compare integers of 64 bits, so that only the wider instruction sets are asked for everything.
@@ -94,10 +96,10 @@ def test_gcc_vectorises_every_function(builds: dict[str, Path]):
     lines = loops_source().splitlines()
     loops = {i for i, line in enumerate(lines, 1) if " LOOP for " in line}
     assert len(loops) == 2 * len(FUNCTIONS)
-    for label in builds_of("gcc"):
-        report = builds[label].with_suffix(".txt")
+    for label, library in builds("gcc").items():
         if "-lanes-avx" in label:
-            found = re.findall(r"loops\.c:(\d+):\d+: \S+ loop vectorized", report.read_text())
+            report = library.with_suffix(".txt").read_text()
+            found = re.findall(r"loops\.c:(\d+):\d+: \S+ loop vectorized", report)
             missing = loops - {int(line) for line in found}
             assert not missing, (label, [lines[i - 1] for i in sorted(missing)])
 
@@ -105,7 +107,7 @@ def test_gcc_vectorises_every_function(builds: dict[str, Path]):
 # ---- The headers as source ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["gcc", "clang", "g++", "clang++"])
+@pytest.mark.parametrize("name", ["gcc", CLANG, PLUS, CLANG_PLUS])
 @pytest.mark.parametrize("level", ["-O0", "-O2"])
 def test_headers_compile_without_a_warning(name: str, level: str, tmp_path: Path):
     plus = name.endswith("++")
@@ -122,31 +124,29 @@ def without_comments(header: Path) -> str:
     return re.sub(r"/\*.*?\*/", " ", header.read_text(), flags=re.DOTALL)
 
 
-def test_float_functions_keep_to_float(tmp_path: Path):
+@pytest.mark.parametrize("name", ["gcc", CLANG])
+def test_float_functions_keep_to_float(name: str, tmp_path: Path):
     """No declaration, constant, promotion or call of double: each is an error in this build."""
     assert not re.search(r"\b(double|uint64_t|long)\b", without_comments(HEADERS["float"]))
     lines = ['#include "gnc_mathf.h"']
-    for name in FUNCTIONS:
-        call = f"gnc_{name}f({'a' if name in ONE_ARGUMENT else 'a, b'})"
-        lines.append(f"float use_{name}(float a, float b);")
-        lines.append(f"float use_{name}(float a, float b) {{ (void)b; return {call}; }}")
+    for function in FUNCTIONS:
+        call = f"gnc_{function}f({'a' if function in ONE_ARGUMENT else 'a, b'})"
+        lines.append(f"float use_{function}(float a, float b);")
+        lines.append(f"float use_{function}(float a, float b) {{ (void)b; return {call}; }}")
     source = tmp_path / "only_float.c"
     source.write_text("\n".join(lines) + "\n")
-    for name in ("gcc", "clang"):
-        if name == "clang" and shutil.which(name) is None:
-            continue
-        extra = ["-Wunsuffixed-float-constants"] if is_gnu(compiler(name)) else []
-        options = ["-std=c99", *WARNINGS, "-Wdouble-promotion", *extra, f"-I{RUNTIME}"]
-        command = [compiler(name), *options, "-c", str(source)]
-        result = subprocess.run([*command, "-o", str(tmp_path / "out.o")], capture_output=True, text=True)
-        assert result.returncode == 0, result.stderr
+    extra = ["-Wunsuffixed-float-constants"] if is_gnu(compiler(name)) else []
+    options = ["-std=c99", *WARNINGS, "-Wdouble-promotion", *extra, f"-I{RUNTIME}"]
+    command = [compiler(name), *options, "-c", str(source)]
+    result = subprocess.run([*command, "-o", str(tmp_path / "out.o")], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr
 
 
 def test_the_only_library_function_is_the_square_root():
     for header in HEADERS.values():
         text = without_comments(header)
         foreign = {call for call in re.findall(r"\b([a-z]\w*)\(", text) if not call.startswith("gnc_")}
-        assert foreign <= {"defined", "void"}, foreign
+        assert foreign <= {"defined", "void", "sizeof"}, foreign
         named = set(re.findall(r"__builtin_\w+|\b(?:sqrtf?|memcpy)\b", text))
         assert named <= {f"__builtin_{name}" for name in ("memcpy", "sqrt", "sqrtf", "fabs", "fabsf")} | {
             "memcpy",
@@ -155,20 +155,32 @@ def test_the_only_library_function_is_the_square_root():
         }
 
 
-@pytest.mark.parametrize("p", PRECISIONS, **by_name)
-def test_arithmetic_that_is_not_ieee_is_refused(p: Precision, tmp_path: Path):
+#: Flags that gcc tells of, each a part of -ffast-math or of its kind, and what the user reads.
+NOT_IEEE = {
+    "-ffast-math": "IEEE",
+    "-Ofast": "IEEE",
+    "-ffinite-math-only": "NaN and infinity",
+    "-funsafe-math-optimizations": "sums in their order",
+    "-freciprocal-math": "divisions as they stand",
+    "-fno-signed-zeros": "signs of zeros",
+    "-mfpmath=387": "FLT_EVAL_METHOD",
+    "-fsingle-precision-constant": "constants_must_be_doubles_",
+}
+
+
+@pytest.mark.parametrize("flag", NOT_IEEE)
+@pytest.mark.parametrize("header", ["gnc_math.h", "gnc_mathf.h", "gnc_allocate_internal.h"])
+def test_arithmetic_that_is_not_ieee_is_refused(header: str, flag: str, tmp_path: Path):
+    if "single" in flag and header == "gnc_mathf.h":
+        return  # its constants are floats as they stand
+    if "387" in flag and os.uname().machine != "x86_64":
+        return
     source = tmp_path / "fast.c"
-    source.write_text(f'#include "{HEADERS[p.name].name}"\n')
-    command = [
-        compiler("gcc"),
-        "-std=c99",
-        "-ffast-math",
-        f"-I{RUNTIME}",
-        "-c",
-        str(source),
-        "-o",
-        str(tmp_path / "out.o"),
-    ]
-    result = subprocess.run(command, capture_output=True, text=True)
+    source.write_text(f'#include "{header}"\n')
+    sizes = [f"-DGNC_ALLOC_{size}=1" for size in "NRPV"]
+    command = [compiler("gcc"), "-std=c99", flag, *sizes, "-DGNC_ALLOC_PREFIX=one", f"-I{RUNTIME}"]
+    result = subprocess.run(
+        [*command, "-c", str(source), "-o", str(tmp_path / "out.o")], capture_output=True, text=True
+    )
     assert result.returncode != 0
-    assert "IEEE" in result.stderr
+    assert NOT_IEEE[flag] in result.stderr

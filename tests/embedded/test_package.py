@@ -36,7 +36,11 @@ def test_vectors_are_the_simulated_flight(case):
     assert (outputs[:1000, -1] == flown["status"].astype(int)).all()
 
 
-@pytest.mark.parametrize("language", [C99, ["-x", "c++", "-std=c++17", "-ffp-contract=off"]], ids=["c99", "c++17"])
+#: gcc compiles C++ only where g++ is installed too.
+CPP17 = pytest.param(["-x", "c++", "-std=c++17", "-ffp-contract=off"], marks=pytest.mark.tools("g++"), id="c++17")
+
+
+@pytest.mark.parametrize("language", [pytest.param(C99, id="c99"), CPP17])
 @pytest.mark.parametrize("case", PACKAGES, ids=lambda case: f"{case[1]}-{case[2]}")
 def test_strict_compilers_have_nothing_to_say(case, language, compiler, tmp_path):
     command = list(compiler.command)
@@ -132,6 +136,7 @@ generate("huang2020/slew", __import__("pathlib").Path(sys.argv[1]), scheme="funn
 """
 
 
+@pytest.mark.slow
 def test_the_same_bytes_on_another_day_and_another_blas(tmp_path):
     """OpenBLAS chooses other kernels, whose products round otherwise; nothing of that may reach the C."""
     folders = []

@@ -2,17 +2,18 @@
 
 import json
 import re
+import subprocess
 
 import casadi as ca
 import pytest
-from packages import copied, made
+from packages import copied, made, run
 
 import casadi_gnc
 from casadi_gnc.delivery import packaging
 from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.delivery.verifying import read_vectors, verify
 from casadi_gnc.embedded import package
-from casadi_gnc.embedded.names import check_name
+from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.errors import CompilerError, OutputError, PackageError, PrinterError, TargetError
 from casadi_gnc.laws import REGISTRY
 from casadi_gnc.missions.onboard import describe
@@ -37,6 +38,30 @@ def listing(folder):
         ("a__b", "reserved"),
         ("x" * 40, "longer"),
         ("ünicode", "identifier"),
+        ("memcpy", "belongs to the library"),
+        ("sqrt", "belongs to the library"),
+        ("sqrtf", "belongs to the library"),
+        ("mtx", "belongs to the library"),
+        ("pulse_t", "belongs to the library"),
+        ("main", "belongs to the library"),
+        ("string", "hide the system's header <string.h>"),
+        ("stdint", "hide the system's header <stdint.h>"),
+        ("gnc", "belongs to the runtime"),
+        ("gnc_math", "belongs to the runtime"),
+        ("slew_alloc", "belongs to the allocator of a package 'slew'"),
+        ("slew_allocate_point", "belongs to the allocator of a package 'slew'"),
+        ("SLEW", "has capital letters: .* take --name slew$"),
+        ("Memcpy", "has capital letters"),
+        ("slew_", "ends with an underscore"),
+        ("test", "taken in the package's own builds"),
+        ("all", "taken in the package's own builds"),
+        ("edit_cache", "taken in the package's own builds"),
+        ("replay", "taken in the package's own builds"),
+        ("replay_word", "taken in the package's own builds"),
+        ("nul", "device on Windows"),
+        ("com1", "device on Windows"),
+        ("linux", "macro"),
+        ("errno", "macro"),
     ],
 )
 def test_names_that_c_refuses(name, reason, tmp_path):
@@ -48,6 +73,45 @@ def test_names_that_c_refuses(name, reason, tmp_path):
 def test_names_that_c_takes():
     for name in ("slew", "Slew2", "a", "x" * 31):
         assert check_name(name) == name
+
+
+def test_files_of_other_names_are_refused_too(tmp_path):
+    """The name of a mission's file is the package's where no other is given."""
+    text = (casadi_gnc.system.assets.folder("problems") / "huang2020" / "slew.toml").read_text()
+    for file in ("test.toml", "two words.toml", "Slew.toml", "string.toml"):
+        (tmp_path / file).write_text(text)
+        with pytest.raises(PackageError, match="the name '"):
+            generate(tmp_path / file, tmp_path / "out")
+        generate(tmp_path / file, tmp_path / "out", name="slew", scheme="pd_pinv", steps=40)
+        (tmp_path / "out").rename(tmp_path / file.replace(".toml", "_out"))
+
+
+@pytest.mark.parametrize("name", ["tomato", "strong", "island", "structure", "status", "input", "sample", "unit"])
+def test_names_that_build(name, tmp_path):
+    """Beside words that are refused there are many that look like them: packages under these build both ways."""
+    folder = made("huang2020/slew", "funnel_robust", "float64", (), name=name, steps=40)
+    assert run("make", "-s", "test", folder=copied(folder, tmp_path)).returncode == 0
+    for language in (["gcc", "-std=c99"], ["g++", "-std=c++17", "-x", "c++"]):
+        for source in [*folder.glob("*.c"), *folder.glob("test/*.c")]:
+            done = run(*language, f"-I{folder}", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", source)
+            assert done.returncode == 0, done.stderr[:1000]
+
+
+def test_names_of_all_headers_of_this_machine_are_known():
+    """Truth: the folder of the system's headers. Those of other libraries (curses, zlib) are not the system's."""
+    public = ("stdio", "stdlib", "string", "math", "time", "pthread", "unistd", "wchar")
+    text = "".join(f"#include <{one}.h>\n" for one in public)
+    done = subprocess.run(["gcc", "-M", "-xc", "-"], input=text, capture_output=True, text=True, check=True)
+    for folder, stem in re.findall(r"(\S+)/([a-z][a-z0-9]*)\.h\b", done.stdout):
+        if folder.endswith("include"):
+            with pytest.raises(PackageError):
+                check_package(stem)
+
+
+@pytest.mark.parametrize(("name", "reason"), [("derived", "member"), ("configured", "member"), ("NULL", "macro")])
+def test_parameters_that_packages_have(name, reason):
+    with pytest.raises(PackageError, match=reason):
+        check_parameter(name)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +224,10 @@ def test_manifest_says_what_it_was_made_of():
     assert package.edited(folder) == []
 
 
-@pytest.mark.parametrize("text", ["", "[]", '{"format": 7}', '{"format": 1, "files": 3}'])
+@pytest.mark.parametrize(
+    "text",
+    ["", "[]", '{"format": 7}', '{"format": 1, "files": 3}', '{"format": 1, "files": {}, "name": 3}', "\\xff"],
+)
 def test_folder_that_is_no_package(text, tmp_path):
     with pytest.raises(PackageError, match="is no package"):
         verify(tmp_path)
@@ -207,6 +274,6 @@ def test_a_continuous_mission_flies_sampled():
 def test_float_package_warns_where_rounding_matters():
     """A measurement of 1e5 m rounds to 4 mm in a float; a law that reads it says so."""
     mission = casadi_gnc.load("huang2020/slew")
-    assert packaging._warnings(mission, "funnel_pinv", "float64") == []
+    assert packaging.warnings(mission, "funnel_pinv", "float64") == []
     stiff = mission.with_scheme("pd_pinv", attitude_gain=1e6)
-    assert "numbers.float32" in packaging._warnings(stiff, "pd_pinv", "float32")[0]
+    assert "numbers.float32" in packaging.warnings(stiff, "pd_pinv", "float32")[0]

@@ -17,7 +17,7 @@ def compiled(function: ca.Function, *, in_place: bool = False):
     """Return a Python callable of the printed C (one input, one output)."""
     text = print_function(function, maths="libm")
     call = f"\nvoid call(const gnc_real *x, gnc_real *y) {{ {function.name()}(x, y); }}\n"
-    library = compilers.build(
+    library = compilers.compiled(
         HEADER + text + call, include=assets.folder("codegen") / "runtime", flags=("-O2", "-fno-builtin")
     )
     run = ctypes.CDLL(str(library)).call

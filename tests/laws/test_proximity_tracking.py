@@ -220,7 +220,7 @@ def test_single_precision_keeps_the_command():
     step = ca.Function("step", [y, m], [ca.cse(law.command(0.0, y, jumped))], ["y", "m"], ["u"])
     text = "#include <math.h>\ntypedef float gnc_real;\n" + print_function(step, maths="libm", real="float")
     text += "void call(const gnc_real *y, const gnc_real *m, gnc_real *u) { step(y, m, u); }\n"
-    library = compilers.build(text, include=assets.folder("codegen") / "runtime", flags=("-O2", "-fno-builtin"))
+    library = compilers.compiled(text, include=assets.folder("codegen") / "runtime", flags=("-O2", "-fno-builtin"))
     run, worst = ctypes.CDLL(str(library)).call, 0.0
     for seen, memory in approach(law):
         single = [np.array(column, dtype=np.float32) for column in (seen, memory, np.zeros(6))]

@@ -47,7 +47,7 @@ def misbehaves(flight: Flight, shows: dict[str, Any]) -> bool:
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case["check"])
-@pytest.mark.parametrize("side", ["fails", "passes"])
+@pytest.mark.parametrize("side", ["fails", pytest.param("passes", marks=pytest.mark.slow)])
 def test_check_and_flight_agree(case, side):
     found, flight = checked_and_flown(case["problem"], case["scheme"], json.dumps(case[side]))
     if side == "fails":

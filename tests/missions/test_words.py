@@ -46,7 +46,7 @@ def test_virtual_machine_and_c_agree_with_a_solver_in_the_loop():
 
 def flown(mission, scheme, compiler: compilers.Compiler, optimise: str, maths="gnc") -> np.ndarray:
     chosen = mission.scheme(scheme)
-    built = tapes.build(mission, chosen)
+    built = tapes.tapes_of(mission, chosen)
     engine = CompiledEngine(mission, chosen, built, maths, compiler=compiler, optimise=optimise)
     carried = begin(mission, built, engine)
     record = np.zeros((mission.timing.samples, built.row.size))

@@ -2,7 +2,6 @@
 
 import atexit
 import functools
-import os
 import shutil
 import subprocess
 import tempfile
@@ -11,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from casadi_gnc.delivery.packaging import generate
-from casadi_gnc.embedded import targets
+from casadi_gnc.embedded import boards
 
 STRICT = ["-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Wdouble-promotion", "-pedantic", "-Werror"]
 C99 = ["-std=c99", "-Wmissing-prototypes", "-ffp-contract=off", "-fno-math-errno"]
@@ -45,12 +44,7 @@ def run(*command, folder: Path | None = None, environment: dict | None = None) -
     )
 
 
-def need_target(name: str) -> targets.Target:
-    """Return a target; without its tools fail in CI and skip, by name, elsewhere."""
-    target = targets.find(name)
-    if target.missing():
-        text = f"target {name} lacks {', '.join(target.missing())}: make targets"
-        if os.environ.get("CI") == "true":
-            pytest.fail(text)
-        pytest.skip(text)
-    return target
+def needs_target(name: str) -> pytest.MarkDecorator:
+    """Return the mark of a test that compiles for a target and runs in its emulator."""
+    target = boards.find(name)
+    return pytest.mark.tools(target.compiler, target.emulator[0])

@@ -180,7 +180,7 @@ def printed(function: ca.Function, real: str):
     text = f'typedef {real} gnc_real;\n#include "gnc_math.h"\n#include "gnc_mathf.h"\n'
     text += print_function(function, real=real)
     text += f"\nvoid call(const gnc_real *x, gnc_real *y) {{ {function.name()}(x, y); }}\n"
-    library = compilers.build(text, include=assets.folder("codegen") / "runtime", flags=("-O2",))
+    library = compilers.compiled(text, include=assets.folder("codegen") / "runtime", flags=("-O2",))
     call, dtype = ctypes.CDLL(str(library)).call, np.float32 if real == "float" else np.float64
 
     def evaluate(x):

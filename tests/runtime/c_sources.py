@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 RUNTIME = ROOT / "codegen" / "runtime"
 UNITS = tuple(sorted(RUNTIME.glob("gnc_allocate*.c")))
-MATHS = (RUNTIME / "gnc_math.h", RUNTIME / "gnc_mathf.h")
+MATHS = (RUNTIME / "gnc_math.h", RUNTIME / "gnc_mathf.h", RUNTIME / "gnc_arithmetic.h")
 ALLOCATOR = (RUNTIME / "gnc_allocate.h", RUNTIME / "gnc_allocate_internal.h", *UNITS)
 FILES = (*MATHS, *ALLOCATOR)
 #: Sizes N, R, P, V and the number type that together pass through every #if.

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: MIT-0
 """The quick share of `make gates`, and proof that each gate can fail."""
 
-import os
-import shutil
 from pathlib import Path
 
 import branch_coverage
@@ -14,31 +12,20 @@ import power_of_ten
 import pytest
 from c_sources import Finding, GateError
 
-
-def need(*programs: str) -> None:
-    """Without a program fail in CI, and skip by name elsewhere."""
-    for program in programs:
-        if shutil.which(program) is None:
-            if os.environ.get("CI") == "true":
-                pytest.fail(f"CI needs {program}")
-            pytest.skip(f"{program} is not installed")
-
-
 # ---- the code passes ---------------------------------------------------------------------------------------------
 
 
+@pytest.mark.tools("cppcheck")
 def test_misra_findings_are_written_deviations(tmp_path: Path):
-    need("cppcheck")
     misra.gate(tmp_path)
 
 
+@pytest.mark.tools("clang-tidy")
 def test_clang_tidy_finds_nothing(tmp_path: Path):
-    need("clang-tidy")
     compilers.tidy(tmp_path)
 
 
 def test_gcc_analyzer_finds_nothing(tmp_path: Path):
-    need("gcc")
     compilers.analyzer(tmp_path)
 
 
@@ -46,23 +33,21 @@ def test_power_of_ten():
     power_of_ten.gate()
 
 
+@pytest.mark.slow
 def test_every_branch_is_taken(tmp_path: Path):
-    need("gcc", "gcov")
     branch_coverage.gate(tmp_path)
 
 
 def test_chosen_cases_under_sanitizers(tmp_path: Path):
-    need("gcc")
     assert "0 failures" in fuzzing.chosen(tmp_path, (4, 3, 1, 2, "double"))
 
 
+@pytest.mark.slow
 def test_fuzzed_allocator_under_sanitizers(tmp_path: Path):
-    need("gcc")
     fuzzing.allocator(tmp_path, whole=False)
 
 
 def test_fuzzed_maths_under_sanitizers(tmp_path: Path):
-    need("gcc")
     fuzzing.maths(tmp_path, whole=False)
 
 

@@ -6,13 +6,13 @@ import casadi as ca
 import numpy as np
 import pytest
 from other_truths import with_plant
-from packages import copied, made, need_target
+from packages import copied, made, needs_target
 
 import casadi_gnc
 from casadi_gnc.allocation.in_flight import Direct
 from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.delivery.verifying import read_vectors
-from casadi_gnc.embedded import package, targets
+from casadi_gnc.embedded import boards, package, targets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.errors import TargetError
@@ -28,11 +28,14 @@ MISSIONS = [
     ("tao2019/case1", "funnels"),
 ]
 HARDWARE = [
-    ("float64", "cortex-m7"),
-    ("float64", "rv64"),
-    ("float32", "cortex-m4f"),
-    ("float32", "cortex-m7"),
-    ("float32", "rv64"),
+    pytest.param(real, name, marks=needs_target(name))
+    for real, name in [
+        ("float64", "cortex-m7"),
+        ("float64", "rv64"),
+        ("float32", "cortex-m4f"),
+        ("float32", "cortex-m7"),
+        ("float32", "rv64"),
+    ]
 ]
 
 
@@ -40,7 +43,7 @@ HARDWARE = [
 @pytest.mark.parametrize("mission", MISSIONS, ids=lambda mission: mission[0])
 def test_no_word_differs(mission, real, name):
     """1000 samples in closed loop, allocator included, then 24 with bad measurements."""
-    target = need_target(name)
+    target = boards.find(name)
     folder = made(*mission, real)
     _, expected = read_vectors(folder, real)
     found = targets.measure(folder, mission[0].split("/")[1], target, float_only=real == "float32")
@@ -50,10 +53,11 @@ def test_no_word_differs(mission, real, name):
     assert (found.data, found.bss) == (0, 0)
 
 
+@needs_target("cortex-m4f")
 @pytest.mark.parametrize("mission", MISSIONS, ids=lambda mission: mission[0])
 def test_no_word_differs_where_double_is_software(mission):
     """The same with every operation on doubles done by the compiler's library, over 200 samples."""
-    target = need_target("cortex-m4f")
+    target = boards.find("cortex-m4f")
     folder = made(*mission, "float64", steps=224)
     _, expected = read_vectors(folder, "float64")
     found = targets.measure(folder, mission[0].split("/")[1], target)
@@ -61,9 +65,10 @@ def test_no_word_differs_where_double_is_software(mission):
     assert int((found.outputs != expected).sum()) == 0
 
 
+@needs_target("cortex-m7")
 @pytest.mark.parametrize("optimise", ["-O0", "-O1", "-O3", "-Os"])
 def test_no_word_differs_whatever_the_optimiser(optimise):
-    target = need_target("cortex-m7")
+    target = boards.find("cortex-m7")
     folder = made("huang2020/slew", "funnel_robust", "float64")
     _, expected = read_vectors(folder, "float64")
     assert int((targets.measure(folder, "slew", target, optimise=optimise).outputs != expected).sum()) == 0
@@ -89,10 +94,13 @@ def without_allocation(real: str, folder, steps: int = 300):
 
 @pytest.mark.parametrize(
     ("real", "name", "instructions", "text"),
-    [("float", "cortex-m4f", 1500, 6 * 1024), ("double", "cortex-m7", 1700, None)],
+    [
+        pytest.param("float", "cortex-m4f", 1500, 6 * 1024, marks=needs_target("cortex-m4f")),
+        pytest.param("double", "cortex-m7", 1700, None, marks=needs_target("cortex-m7")),
+    ],
 )
 def test_the_slew_law_is_cheap(real, name, instructions, text, tmp_path):
-    target = need_target(name)
+    target = boards.find(name)
     expected = without_allocation(real, tmp_path)
     found = targets.measure(tmp_path, "slew", target, float_only=real == "float")
     assert int((found.outputs != expected).sum()) == 0
@@ -100,17 +108,19 @@ def test_the_slew_law_is_cheap(real, name, instructions, text, tmp_path):
     assert text is None or found.text <= text
 
 
+@needs_target("cortex-m7")
 def test_the_robust_allocator_keeps_its_budget():
     """Cold: the first sample; warm: the median. The last 24 samples have jumps and are not counted."""
-    target = need_target("cortex-m7")
+    target = boards.find("cortex-m7")
     found = targets.measure(made("huang2020/slew", "funnel_robust", "float64"), "slew", target)
     assert found.instructions[0] <= 600_000
     assert np.median(found.instructions) <= 60_000
     assert found.instructions[:1000].max() <= 600_000
 
 
+@needs_target("cortex-m4f")
 def test_a_double_in_a_float_package_is_refused(tmp_path):
-    target = need_target("cortex-m4f")
+    target = boards.find("cortex-m4f")
     folder = copied(made("huang2020/slew", "pd_pinv", "float32"), tmp_path)
     source = folder / "slew.c"
     text = source.read_text()
@@ -150,10 +160,10 @@ uint32_t slew_step(slew_state *state, const slew_params *params, const slew_inpu
 """
 
 
-@pytest.mark.parametrize("name", ["cortex-m4f", "cortex-m7", "rv64"])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=needs_target(name)) for name in boards.names()])
 def test_counts_and_stack_are_true(name, tmp_path):
     """A step of 1000 no-operations and a few more, with 3000 bytes of locals: known beforehand."""
-    target = need_target(name)
+    target = boards.find(name)
     source = made("huang2020/slew", "pd_pinv")
     replay = (source / "test" / "replay.h").read_text()
     start, end = replay.index("static inline void replay_take"), replay.index("static inline void replay_load")

@@ -25,6 +25,20 @@ import numpy as np
 from casadi_gnc.errors import AllocationError
 from casadi_gnc.registry import Registry
 
+__all__ = [
+    "QPSOLVERS",
+    "REGISTRY",
+    "BackEnd",
+    "Capability",
+    "Found",
+    "Solver",
+    "available",
+    "missing",
+    "module",
+    "name_of",
+    "names",
+]
+
 
 class Capability(Flag):
     """What a back end can do."""

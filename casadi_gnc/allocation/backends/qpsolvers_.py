@@ -9,7 +9,7 @@ Slow, since the problem is handed over whole every sample: for comparison.
 from __future__ import annotations
 
 import warnings
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
@@ -51,6 +51,23 @@ _MAX_ITERATIONS = {
 }
 
 
+@cache
+def _let_highs_introduce_itself() -> None:
+    """Let HiGHS write its banner where nobody sees it, before qpsolvers makes the first of its solvers.
+
+    From highspy 1.16 on the first solver that a process makes writes a banner while it is made, in the method that
+    installs the callbacks; qpsolvers turns the console off, but after that. This one turns it off before.
+    """
+    highs: Any = import_module("highspy").Highs
+
+    class Silent(highs):
+        def enableCallbacks(self) -> None:
+            self.setOptionValue("log_to_console", False)
+            super().enableCallbacks()
+
+    Silent()
+
+
 class _ThroughQpsolvers(QuadraticProgram):
     def __init__(self, problem: AllocationProblem, solver: str, options: dict[str, Any]) -> None:
         super().__init__(problem)
@@ -58,6 +75,8 @@ class _ThroughQpsolvers(QuadraticProgram):
         if solver not in self._package.available_solvers:
             found = ", ".join(self._package.available_solvers)
             raise AllocationError(f"qpsolvers does not find the solver {solver!r}; it finds {found}")
+        if solver == "highs":
+            _let_highs_introduce_itself()
         self._solver, self._options = solver, options
         is_sparse = solver in self._package.sparse_solvers
         self._matrix = sparse.csc_matrix(self.hessian) if is_sparse else self.hessian

@@ -10,6 +10,8 @@ import inspect
 from collections.abc import Callable
 from importlib import import_module
 
+__all__ = ["COMPUTATIONS"]
+
 _PAPERS = ("huang2019", "huang2020", "shi2020", "sun2018", "tao2019")
 
 

@@ -22,6 +22,8 @@ from casadi_gnc.errors import SynthesisError
 from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis.scaling import Scaled
 
+__all__ = ["REGISTRY", "BackEnd", "Claim", "Found", "module", "names"]
+
 
 class Claim(Enum):
     """What a solver says of a problem."""

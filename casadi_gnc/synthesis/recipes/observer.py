@@ -101,7 +101,7 @@ def observer(
             lmis.psd(disc, margin=0.1 * margin, name="fastest pole")
         return P
 
-    def build(answer: LmiAnswer, promised: float) -> Synthesis:
+    def gains_of(answer: LmiAnswer, promised: float) -> Synthesis:
         L = np.linalg.solve(answer["P"], answer["H"])
         norm = h_infinity_norm(A - L @ C, E - L @ F, G)
         return certify_gains(
@@ -114,4 +114,4 @@ def observer(
             missing=missing if noisy < r else "Give fastest_rad_s.",
         )
 
-    return two_steps(pose, build, gamma, slack, backend, options)
+    return two_steps(pose, gains_of, gamma, slack, backend, options)

@@ -110,7 +110,7 @@ def state_feedback(
             lmis.psd(disc, margin=0.1 * margin, name="fastest pole")
         return X
 
-    def build(answer: LmiAnswer, promised: float) -> Synthesis:
+    def gains_of(answer: LmiAnswer, promised: float) -> Synthesis:
         K = np.linalg.solve(answer["X"], answer["W"].T).T
         norm = h_infinity_norm(A - B @ K, E, C - D @ K, F)
         return certify_gains(
@@ -126,4 +126,4 @@ def state_feedback(
             missing=missing if priced < m else "Give fastest_rad_s.",
         )
 
-    return two_steps(pose, build, gamma, slack, backend, options)
+    return two_steps(pose, gains_of, gamma, slack, backend, options)

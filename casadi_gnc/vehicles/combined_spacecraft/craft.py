@@ -27,8 +27,9 @@ from casadi_gnc.tables.disturbances import OrbitAndTorque
 from casadi_gnc.tables.orientation import Orientation
 from casadi_gnc.tables.part import MisfitError, Part, Positive, Vector, table
 from casadi_gnc.tables.thrusters import Engine, Thrusters
-from casadi_gnc.vehicles.combined_spacecraft.plant import BodyPart, CombinedSpacecraft, compose_inertia
-from casadi_gnc.vehicles.combined_spacecraft.tables import (
+
+from .plant import BodyPart, CombinedSpacecraft, compose_inertia
+from .tables import (
     Believed,
     BodyPartTable,
     RobustAgainstMassCentre,

@@ -24,9 +24,10 @@ from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.tables.part import MisfitError, Part, Positive, Vector, table
-from casadi_gnc.vehicles.docking_pair.coils import Coil
-from casadi_gnc.vehicles.docking_pair.plant import DockingPair, MeasurementNoise
-from casadi_gnc.vehicles.docking_pair.tables import (
+
+from .coils import Coil
+from .plant import DockingPair, MeasurementNoise
+from .tables import (
     Believed,
     Environment,
     Fault,

@@ -11,7 +11,8 @@ from casadi_gnc.mechanics.dipoles import TargetDipole
 from casadi_gnc.mechanics.disturbances import Harmonics
 from casadi_gnc.tables.disturbances import OuterForce
 from casadi_gnc.tables.part import NonNegative, Part, Positive, Vector
-from casadi_gnc.vehicles.docking_pair.plant import FaultPiece, FaultProfile
+
+from .plant import FaultPiece, FaultProfile
 
 
 class TargetMoment(Part):

@@ -27,8 +27,9 @@ from casadi_gnc.tables import matrices
 from casadi_gnc.tables.disturbances import OrbitalPush
 from casadi_gnc.tables.limits import ForceAndTorqueLimits
 from casadi_gnc.tables.part import Part, Positive, table
-from casadi_gnc.vehicles.drag_free_pair.plant import DragFreePair
-from casadi_gnc.vehicles.drag_free_pair.tables import Believed, Initial, Orbit
+
+from .plant import DragFreePair
+from .tables import Believed, Initial, Orbit
 
 _KEYS = {"mrp": "mrp", "rate": "rate_rad_per_s", "position": "position_m", "velocity": "velocity_m_per_s"}
 

@@ -16,7 +16,7 @@ from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
 if TYPE_CHECKING:
-    from casadi_gnc.vehicles.proximity_pair.craft import ProximityPairCraft
+    from .craft import ProximityPairCraft
 
 
 def checks(craft: ProximityPairCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:

@@ -25,8 +25,9 @@ from casadi_gnc.tables import matrices
 from casadi_gnc.tables.disturbances import OrbitalPush
 from casadi_gnc.tables.limits import ForceAndTorqueLimits
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector, table
-from casadi_gnc.vehicles.proximity_pair.plant import EFFORT, RELATIVE, ProximityPair, RelativeSensor
-from casadi_gnc.vehicles.proximity_pair.tables import Believed, Initial, Orbit, Sensors, Target
+
+from .plant import EFFORT, RELATIVE, ProximityPair, RelativeSensor
+from .tables import Believed, Initial, Orbit, Sensors, Target
 
 #: Largest eccentricity of an orbit that a file may call circular: 0.5 m/s at 7.5 km/s make 1.4e-4.
 CIRCULAR = 1e-3
@@ -126,7 +127,7 @@ class ProximityPairCraft(Craft):
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
         """Yield what can be said of chaser and target only."""
-        from casadi_gnc.vehicles.proximity_pair.checks import checks
+        from .checks import checks
 
         return checks(self, mission, scheme)
 

@@ -11,10 +11,11 @@ from casadi_gnc.checking import geometry, wheels
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
-from casadi_gnc.vehicles.wheel_spacecraft.tables import RobustWheels, SchemeKeys
+
+from .tables import RobustWheels, SchemeKeys
 
 if TYPE_CHECKING:
-    from casadi_gnc.vehicles.wheel_spacecraft.craft import WheelSpacecraftCraft
+    from .craft import WheelSpacecraftCraft
 
 
 def checks(craft: WheelSpacecraftCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:

@@ -31,9 +31,10 @@ from casadi_gnc.tables.attitude import AttitudeStart
 from casadi_gnc.tables.disturbances import OrbitAndTorque
 from casadi_gnc.tables.orientation import Orientation
 from casadi_gnc.tables.part import MisfitError, Part, Positive, table
-from casadi_gnc.vehicles.wheel_spacecraft.limits import SpeedLimit
-from casadi_gnc.vehicles.wheel_spacecraft.plant import SensorError, WheelSpacecraft
-from casadi_gnc.vehicles.wheel_spacecraft.tables import Fault, MountedWheels, RobustWheels, SchemeKeys, Sensors, Truth
+
+from .limits import SpeedLimit
+from .plant import SensorError, WheelSpacecraft
+from .tables import Fault, MountedWheels, RobustWheels, SchemeKeys, Sensors, Truth
 
 #: Shown with every flight whose wheel axes are taken for points.
 AXES_AS_POINTS = (
@@ -164,7 +165,7 @@ class WheelSpacecraftCraft(Craft, Orientation):
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
         """Yield what can be said of a craft on wheels only."""
-        from casadi_gnc.vehicles.wheel_spacecraft.checks import checks
+        from .checks import checks
 
         return checks(self, mission, scheme)
 
