@@ -112,7 +112,8 @@ def read(reference: str, folder: Path) -> GuestFile:
     target = folder / inside
     if not target.is_file():
         raise GuestError(
-            f"{reference!r}: there is no file {inside} in {folder.resolve().name}/, beside the problem file"
+            f"{reference!r}: there is no file {inside} in {folder.resolve().name}/; what a problem file names lies "
+            "beside it or below, what an option of a command names in the current folder"
         )
     if not target.resolve().is_relative_to(folder.resolve()):
         raise GuestError(f"{reference!r} is a link that leads out of the problem file's folder; copy the file there")

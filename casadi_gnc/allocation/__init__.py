@@ -16,6 +16,7 @@ from casadi_gnc.allocation.in_flight import (
     OnlineInFlight,
     PseudoInverse,
     SolverInFlight,
+    leaves_none_out,
     pseudo_inverse,
 )
 from casadi_gnc.allocation.problem import AllocationProblem
@@ -34,6 +35,7 @@ __all__ = [
     "SolverInFlight",
     "best_weights",
     "certify",
+    "leaves_none_out",
     "pseudo_inverse",
     "solve",
 ]

@@ -13,8 +13,8 @@ from casadi_gnc.allocation.allocator import Allocator
 from casadi_gnc.allocation.answer import AllocationStatus
 from casadi_gnc.allocation.online import OnlineSolver
 from casadi_gnc.allocation.problem import AllocationProblem
-from casadi_gnc.errors import NoCompilerError
-from casadi_gnc.mathematics import bounds
+from casadi_gnc.errors import AllocationError, NoCompilerError
+from casadi_gnc.mathematics import bounds, exact
 from casadi_gnc.mechanics.rigid_body import inverse3
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
@@ -22,8 +22,28 @@ from casadi_gnc.system import compilers
 
 
 def pseudo_inverse(effectiveness: ca.DM) -> ca.DM:
-    """Return A'(A A')^-1, (N, 3), by plain arithmetic (no LAPACK, so constants are portable)."""
+    """Return A'(A A')^-1, (N, 3), by plain arithmetic (no LAPACK, so constants are portable).
+
+    Raises
+    ------
+    AllocationError
+        For actuators that leave an effort out: there is no such inverse.
+    """
+    if not leaves_none_out(effectiveness):
+        rows, rank = effectiveness.shape[0], np.linalg.matrix_rank(np.array(ca.DM(effectiveness)))
+        raise AllocationError(
+            f"the effectiveness has rank {rank}, expected {rows}: some effort cannot be made by any combination of the "
+            'actuators; add or turn one, or allocate with method = "robust", which makes what can be made'
+        )
     return ca.mtimes(effectiveness.T, inverse3(ca.mtimes(effectiveness, effectiveness.T)))
+
+
+def leaves_none_out(effectiveness: Any) -> bool:
+    """Return whether every effort can be made, as far as is known: of an effectiveness of numbers, by its rank."""
+    if not exact.is_number(effectiveness):
+        return True
+    matrix = np.array(ca.DM(effectiveness))
+    return bool(np.isfinite(matrix).all() and np.linalg.matrix_rank(matrix) == len(matrix))
 
 
 @dataclass(frozen=True, eq=False)

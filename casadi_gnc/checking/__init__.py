@@ -42,7 +42,9 @@ def check(mission: Mission, scheme: str | None = None) -> list[Check]:
     ['funnel.floor.mrp', 'gains.anti_windup', 'sampling.closed_loop']
     """
     chosen = mission.schemes if scheme is None else (mission.scheme(scheme),)
-    families = [*map(REGISTRY.find, REGISTRY.names()), mission.craft.checks, *mission.checks]
+    everywhere = [*map(REGISTRY.find, REGISTRY.names())]
+    own = [family for family in mission.checks if not any(family is other for other in everywhere)]
+    families = [*everywhere, mission.craft.checks, *own]
     return [each.of(one.name) for one in chosen for family in families for each in _found(family, mission, one)]
 
 

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.allocation import PseudoInverse, leaves_none_out
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
@@ -72,7 +73,8 @@ def pushes_both_ways(scheme: Scheme) -> bool:
 
 def least_real_parts(mission: Mission, scheme: Scheme, slope: np.ndarray) -> dict[str, float]:
     """Return the least real part of the torque map's eigenvalues by what is true."""
-    scale = np.diag(np.array(scheme.actuation.limit_above))
+    above = np.array(scheme.actuation.limit_above)
+    scale = np.diag(np.where(above > 0, above, 1.0))
     return {
         name: float(np.linalg.eigvals(np.linalg.solve(scale, truth @ slope @ scale)).real.min())
         for name, truth in mission.craft.true_effectivenesses(mission, scheme).items()
@@ -80,8 +82,14 @@ def least_real_parts(mission: Mission, scheme: Scheme, slope: np.ndarray) -> dic
 
 
 def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
-    """Return dF/du at rest, (N, R), by central differences of what flies."""
+    """Return dF/du at rest, (N, R), by central differences of what flies.
+
+    Where the actuators leave an effort out there is no pseudo-inverse to fly; then that of least squares.
+    """
     actuation, count = scheme.actuation, mission.truth.inputs.size
+    matrix = actuation.matrix(mission.truth.measurement.split(mission.first_measurement()))
+    if isinstance(actuation.allocator, PseudoInverse) and not leaves_none_out(matrix):
+        return np.linalg.pinv(np.array(ca.DM(matrix)))
     lower, upper, rest = np.array(actuation.lower), np.array(actuation.upper), np.zeros(count)
     if actuation.is_symbolic:
         loop = Loop(mission, scheme)
@@ -101,6 +109,6 @@ def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
     columns = []
     for row, limit in enumerate(actuation.limit_above):
         u = np.zeros(len(actuation.limit_above))
-        u[row] = _SMALL * limit
+        u[row] = _SMALL * (limit or 1.0)
         columns.append((allocate(u) - allocate(-u)) / (2 * u[row]))
     return np.array(columns).T

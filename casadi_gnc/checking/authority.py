@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 
 import casadi as ca
@@ -166,6 +166,13 @@ def _static_demand(mission: Mission, data: bytes, shape: tuple[int, int], *box: 
     return float(max(shares, default=float("nan")))
 
 
+def _share(taken: np.ndarray, bounds: Sequence[float]) -> np.ndarray:
+    """Return what is taken over its bounds: of none, nothing is no share and anything all there is."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shares = taken / np.array(bounds)
+    return np.where(taken == 0, 0.0, shares)
+
+
 def allocated_demand(mission: Mission, scheme: Scheme, slope: np.ndarray) -> float:
     """Return the largest share of bounds and limits that standing still takes through an allocation F = slope u."""
     _, drift, gain = standing.loads(mission)
@@ -176,6 +183,6 @@ def allocated_demand(mission: Mission, scheme: Scheme, slope: np.ndarray) -> flo
     if np.abs(left).max(initial=0.0) > _BORNE * np.abs(drift).max(initial=0.0):
         return float("inf")
     actuation = scheme.actuation
-    shares = [wanted / np.array(actuation.limit_above), wanted / np.array(actuation.limit_below)]
-    shares += [made / np.array(actuation.upper), made / np.array(actuation.lower)]
+    shares = [_share(wanted, actuation.limit_above), _share(wanted, actuation.limit_below)]
+    shares += [_share(made, actuation.upper), _share(made, actuation.lower)]
     return float(np.hstack(shares).max(initial=0.0))

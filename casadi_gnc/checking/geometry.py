@@ -51,9 +51,10 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
 
 
 def scale(scheme: Scheme) -> np.ndarray:
-    """Return the matrix that scales efforts by their limits, (R, R)."""
+    """Return the matrix that scales efforts by their limits, (R, R); zero where nothing may be asked for."""
     below, above = (np.abs(np.array(each)) for each in (scheme.actuation.limit_below, scheme.actuation.limit_above))
-    return np.diag(1 / np.maximum(below, above))
+    most = np.maximum(below, above)
+    return np.diag(1 / np.where(most > 0, most, np.inf))
 
 
 def triangle(name: str, inertia: np.ndarray) -> Check:

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 from scipy import linalg
 
+from casadi_gnc.allocation import leaves_none_out
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
@@ -173,8 +174,10 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
 
 
 def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:
-    """Return the least actuator commands that make the wanted effort, bounds left out."""
+    """Return the least actuator commands that make the wanted effort, or come nearest to it, bounds left out."""
     matrix = scheme.actuation.matrix(mission.truth.measurement.split(y))
+    if not leaves_none_out(matrix):
+        return ca.mtimes(ca.DM(np.linalg.pinv(np.array(ca.DM(matrix)))), wanted)
     return ca.mtimes(matrix.T, ca.solve(ca.mtimes(matrix, matrix.T), wanted))
 
 

@@ -75,9 +75,10 @@ def _actuators(mission: Mission, scheme: Scheme) -> Iterator[Check]:
 
 
 def limits(scheme: Scheme) -> np.ndarray:
-    """Return the smaller limit of each effort, (R,)."""
+    """Return the smaller limit of each effort, (R,); infinite where nothing may be asked for, so no share counts."""
     below, above = (np.abs(np.array(each)) for each in (scheme.actuation.limit_below, scheme.actuation.limit_above))
-    return np.minimum(below, above)
+    least = np.minimum(below, above)
+    return np.where(least > 0, least, np.inf)
 
 
 def measurement_slope(mission: Mission) -> np.ndarray:

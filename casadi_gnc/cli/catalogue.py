@@ -42,6 +42,7 @@ def crafts(
 ) -> None:
     """List the crafts: what each measures and makes, the keys of its tables, and the laws that fit it."""
     from casadi_gnc.problem_files import catalogue
+    from casadi_gnc.problem_files.document import shipped
 
     known = catalogue.laws(problem)
     found = []
@@ -56,10 +57,13 @@ def crafts(
     for craft in found:
         _heading(craft)
         typer.echo(f"  measures {_signals(craft['measures'])}")
-        typer.echo(f"  makes {_signals(craft['makes'])}; believes in {_or(craft['believes'])}")
-        typer.echo(f"  laws that fit: {', '.join(craft['laws']) or 'none that is known'}")
+        if craft["makes"] is not None:
+            typer.echo(f"  makes {_signals(craft['makes'])}; believes in {_or(craft['believes'])}")
+            typer.echo(f"  laws that fit: {', '.join(craft['laws']) or 'none that is known'}")
         if craft["example"]:
-            typer.echo(f"  example: casadi-gnc problems copy {craft['example']} .")
+            is_ours = craft["example"] in shipped()
+            told = f"casadi-gnc problems copy {craft['example']} ." if is_ours else craft["example"]
+            typer.echo(f"  example: {told}")
         rows = [
             [key["table"], key["name"], "" if key["required"] else "optional", key["meaning"]] for key in craft["keys"]
         ]

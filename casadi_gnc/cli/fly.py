@@ -33,7 +33,9 @@ def fly(
     problem: Annotated[str, typer.Argument(help="A problem file, or the name of a shipped one.")],
     out: Annotated[Path | None, typer.Option(help="Folder for the results; out/<mission> if left out.")] = None,
     scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
-    engine: Annotated[str, typer.Option(help="c: compiled; vm: CasADi's virtual machine; or a package's own.")] = "c",
+    engine: Annotated[
+        str, typer.Option(help="c: compiled C; vm: CasADi's virtual machine; or ./file.py:CLASS, or a package's.")
+    ] = "c",
     math: Annotated[
         MathChoice, typer.Option(help="gnc: same words everywhere; libm: as CasADi's own.")
     ] = MathChoice.gnc,

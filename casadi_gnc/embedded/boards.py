@@ -107,5 +107,16 @@ def of_file(path: Path) -> Target:
     if wrong or missing:
         told = f"unknown key {wrong[0]!r}" if wrong else f"{missing[0]!r} is missing"
         raise TargetError(f"the target {path.name}: {told}; expected {', '.join(known)}")
+    for key, value in fields.items():
+        is_text = Target.__dataclass_fields__[key].type == "str"
+        if not (isinstance(value, str) if is_text else _are_texts(value)):
+            expected = "a text" if is_text else "a list of texts"
+            raise TargetError(f"the target {path.name}: {key} is {value!r}, expected {expected}")
+    if not fields["emulator"]:
+        raise TargetError(f"the target {path.name}: emulator is empty, expected the command that runs an image")
     whole: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in fields.items()}
     return Target(path.stem, **whole, folder=path.parent)
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, str) for one in value)

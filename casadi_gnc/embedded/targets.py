@@ -161,7 +161,9 @@ def _run(command: list[str], target: Target) -> str:
     except (OSError, subprocess.SubprocessError) as error:
         raise TargetError(f"target {target.name}: {command[0]} could not be run: {error}") from error
     if done.returncode:
-        complaint = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
+        lines = [line for line in done.stderr.splitlines() if not line.startswith("collect2:")]
+        said = [line for word in ("error", "cannot", "undefined", "overflow") for line in lines if word in line]
+        complaint = said[0] if said else done.stderr[:200]
         raise TargetError(f"target {target.name}: {command[0]} refused: {complaint.strip()}")
     return done.stdout
 

@@ -170,5 +170,17 @@ class Law:
 
 
 def gains_of(law: type[Law]) -> dict[str, dataclasses.Field]:
-    """Return the gains and options of a law that a problem file gives, by name."""
+    """Return the gains and options of a law that a problem file gives, by name.
+
+    Raises
+    ------
+    LawError
+        For a class whose fields were declared and never made: one without the decorator.
+    """
+    loose = [name for name, value in vars(law).items() if isinstance(value, dataclasses.Field)]
+    if loose:
+        raise LawError(
+            f"{law.__name__} declares {', '.join(loose)} and is no dataclass; write @dataclass(frozen=True, eq=False) "
+            f"above class {law.__name__}"
+        )
     return {field.name: field for field in dataclasses.fields(law) if "unit" in field.metadata}

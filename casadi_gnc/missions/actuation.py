@@ -107,6 +107,11 @@ class Actuation(Actuators):
     @classmethod
     def of(cls, actuators: Actuators, limit: Sequence[float], allocator: Any) -> Actuation:
         """Return the actuation of some actuators, with limits of the same magnitude on both sides."""
+        if len(limit) != actuators.effort.size:
+            raise FlightError(
+                f"{len(limit)} limits of the effort, expected {actuators.effort.size}, one for each row of "
+                f"{', '.join(actuators.effort.names)}"
+            )
         own = {name: getattr(actuators, name) for name in Actuators.__dataclass_fields__}
         return cls(**own, limit_below=[-value for value in limit], limit_above=list(limit), allocator=allocator)
 

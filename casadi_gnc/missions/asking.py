@@ -16,6 +16,11 @@ from casadi_gnc import guests
 from casadi_gnc.errors import GncError, LawError
 from casadi_gnc.signals import Layout
 
+#: What Python decides at once is not known of a symbol.
+_ON_SYMBOLS = (
+    "Python's if, and, or, min, max cannot decide on symbols; take casadi.if_else or casadi_gnc.mathematics.bounds"
+)
+
 
 def ask(owner: Any, method: str, *arguments: Any) -> Any:
     """Return what a method of a law, a plant or a craft returns; its failure is one sentence with its own lines."""
@@ -31,6 +36,8 @@ def ask(owner: Any, method: str, *arguments: Any) -> Any:
 def _told(error: Exception) -> str:
     """Return an exception as a sentence with its author's lines; of CasADi's many lines, the one that says it."""
     text = str(error).strip()
+    if "truth value" in text:
+        return _ON_SYMBOLS + guests.own_lines(error)
     if not isinstance(error, (RuntimeError, NotImplementedError)) or "\n" not in text:
         return guests.told(error)
     lines = [line.strip() for line in text.splitlines() if line.strip()]

@@ -51,7 +51,8 @@ class Craft(Part):
 
     #: Further keys of a [[scheme]] that flies this craft; `actuation` takes them.
     scheme_keys: ClassVar[type[Part]] = EffortKeys
-    #: A shipped problem that flies this craft, for catalogues; None where one is made without arguments.
+    #: A problem that flies this craft, for catalogues: a shipped one, or the path of a mission file of a package.
+    #: None where a craft is made without arguments.
     example: ClassVar[str | None] = None
 
     def __init__(self, **keys: Any) -> None:
@@ -102,8 +103,13 @@ class Craft(Part):
 
     def panels(self, mission: Mission) -> Sequence[Panel]:
         """Return what a flight's picture shows: what is measured, the efforts, the actuators."""
-        plant, effort = mission.truth, mission.schemes[0].actuation.effort
-        seen = [Panel("lines", name, name.replace("_", " ")) for name in plant.measurement.names if name in plant.state]
+        plant, effort, goals = mission.truth, mission.schemes[0].actuation.effort, self.regulated(mission)
+        tracked = {name for name, goal in goals.items() if not any(goal)} | {one.signal for one in mission.funnels}
+        seen = [
+            Panel("tracked" if name in tracked else "lines", name, name.replace("_", " "))
+            for name in plant.measurement.names
+            if name in plant.state
+        ]
         made = [Panel("effort", name, name.replace("_", " ")) for name in effort.names]
         others = [name for name in plant.inputs.names if name not in effort]
         told = [Panel("actuators", name, name.replace("_", " ")) for name in others]

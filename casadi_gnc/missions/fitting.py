@@ -6,15 +6,18 @@ of the craft is of the kind that the law models, and the effort it commands is w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law
+from casadi_gnc.missions import asking
+from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.recording import row_of
-from casadi_gnc.missions.scheme import Metric
+from casadi_gnc.missions.scheme import Metric, Scheme
+from casadi_gnc.missions.timing import Timing
 from casadi_gnc.signals import Layout, Signal
 
 if TYPE_CHECKING:
@@ -61,6 +64,34 @@ def _apart(own: Signal, other: Signal, what: str, how: str) -> Iterator[str]:
         yield f"{what} in {own.unit or '-'}, and it is {how} in {other.unit or '-'}"
     elif own.frame and other.frame and own.frame != other.frame:
         yield f"{what} in the frame {own.frame!r}, and it is {how} in {other.frame!r}"
+
+
+def refuse_strangers(mission: Mission) -> None:
+    """Raise `FlightError` where a part of a mission is of another kind: a class in the place of an object."""
+    if not isinstance(mission.schemes, (list, tuple)):
+        raise FlightError(f"schemes is {_given(mission.schemes)}, expected a list of casadi_gnc.Scheme")
+    expected = [("craft", mission.craft, Craft), ("timing", mission.timing, Timing)]
+    expected += [(f"schemes[{i}]", scheme, Scheme) for i, scheme in enumerate(mission.schemes)]
+    laws = [(f"the law of {one.name!r}", one.law, Law) for one in mission.schemes if isinstance(one, Scheme)]
+    for name, value, kind in [*expected, *laws]:
+        if not isinstance(value, kind):
+            raise FlightError(f"{name} is {_given(value)}, expected an object of a casadi_gnc.{kind.__name__}")
+
+
+def _given(value: Any) -> str:
+    return f"the class {value.__name__}" if isinstance(value, type) else f"an object of type {type(value).__name__}"
+
+
+def goals(mission: Mission) -> Mapping[str, Sequence[float]]:
+    """Return what a craft says is regulated; raise `FlightError` where that is no state of its plant."""
+    state, craft = mission.truth.state, type(mission.craft).__name__
+    found: Mapping[str, Sequence[float]] = asking.ask(mission.craft, "regulated", mission)
+    for name, goal in found.items():
+        if name not in state:
+            raise FlightError(f"{craft}.regulated names {name!r}, which is no state; there is {', '.join(state.names)}")
+        if len(goal) != state.signal(name).size:
+            raise FlightError(f"{craft}.regulated gives {len(goal)} numbers of {name}, not {state.signal(name).size}")
+    return found
 
 
 def refuse(mission: Mission) -> None:

@@ -17,7 +17,7 @@ from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.guests import GuestFile
-from casadi_gnc.missions import asking, fitting, functions, parts, probing
+from casadi_gnc.missions import fitting, functions, parts, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
 from casadi_gnc.missions.origin import Origin, keys_of_timing
@@ -78,6 +78,7 @@ class Mission:
     origin: Origin | None = None
 
     def __post_init__(self) -> None:
+        fitting.refuse_strangers(self)
         hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
         held = (
             each if each.law.hold == hold else replace(each, law=replace(each.law, hold=hold)) for each in self.schemes
@@ -102,7 +103,7 @@ class Mission:
     @cached_property
     def target(self) -> Mapping[str, Sequence[float]]:
         """The states that the laws regulate, by name, and the values that they bring them to."""
-        return asking.ask(self.craft, "regulated", self)
+        return fitting.goals(self)
 
     @property
     def digest(self) -> str:

@@ -50,7 +50,7 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
     """Draw all flights on logarithmic axes and return the path of the picture.
 
     Drawn is the share of each funnel that was used, or, where there is no funnel, the largest
-    component of every tracked signal.
+    component of every tracked signal; of a craft whose pictures track nothing, of what else they show.
     """
     wanted: list[tuple[str, str, float | None, str]]
     several = len(mission.funnels) > 1
@@ -64,11 +64,11 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
         for number, funnel in enumerate(mission.funnels)
     ]
     if not wanted:
-        for panel in (panel for panel in mission.craft.panels(mission) if panel.kind == "tracked"):
-            level = next(iter(_thresholds(mission, panel.signal)), None)
-            unit = flights[0].unit(panel.signal)
+        for panel, signal in _compared(mission):
+            level = next(iter(_thresholds(mission, signal)), None)
+            unit = flights[0].unit(signal)
             told = "" if level is None else f"settled below {level:g} {unit}".rstrip(" -")
-            wanted.append((panel.signal, f"largest {panel.label} component [{unit or '-'}]", level, told))
+            wanted.append((signal, f"largest {panel.label} component [{unit or '-'}]", level, told))
     figure, axes = _figure(len(wanted), height=4.8 if len(wanted) == 1 else 2.8 * len(wanted) + 1)
     for each, (signal, label, level, told) in zip(axes, wanted, strict=True):
         for colour, flight in zip(COLOURS, flights, strict=False):
@@ -82,6 +82,17 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
     axes[0].set_title(picture(mission.title), fontsize=_FONT + 1, loc="left")
     figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)
     return _save(figure, folder / "comparison.png")
+
+
+def _compared(mission: Mission) -> list[tuple[Panel, str]]:
+    """Return the panels whose signals are compared, each with the name under which its signal is recorded."""
+    panels, actuation = mission.craft.panels(mission), mission.schemes[0].actuation
+    for kind in ("tracked", "lines", "actuators"):
+        found = [(panel, panel.signal) for panel in panels if panel.kind == kind]
+        if found:
+            return found
+    made = dict(zip(actuation.effort.names, actuation.named("achieved").names, strict=True))
+    return [(panel, made[panel.signal]) for panel in panels]
 
 
 def _thresholds(mission: Mission, signal: str) -> list[float]:

@@ -15,7 +15,7 @@ from casadi_gnc.testing.asserting import must
 def check_family(family: Callable[[Mission, Scheme], Iterable[Check]], mission: Mission) -> list[Check]:
     """Test a family of checks on every scheme of a mission; return what it found.
 
-    Tested: it yields `Check`s with distinct names, a limit that is a number, and a consequence, a remedy and a
+    Tested: it yields checks (`Check`) with distinct names, a limit that is a number, and a consequence, a remedy and a
     source that are sentences; asked again it says the same.
 
     Raises
