@@ -305,9 +305,6 @@ BAD = {
         lambda d: d["scheme"][0].update(law={"type": "rate_damping"}),
         "law.type: the law 'rate_damping' does not fit",
     ),
-        lambda d: d["scheme"][0].update(law={"type": "rate_damping"}),
-        "law.type: the law 'rate_damping' does not fit",
-    ),
     "unknown erratum": (lambda d: d["scheme"][0].update(as_printed=["observer_stop"]), "no erratum"),
     "incredible start": (lambda d: d["initial"].update(position_m=[2e4, 0, 0]), "largest credible position"),
 }
