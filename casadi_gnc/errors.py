@@ -18,13 +18,15 @@ class ProblemError(GncError):
 
     def __init__(self, message: str, place: str = "") -> None:
         self.place = place
+        #: Each defect, (message, place); more than one where `several` made the error.
+        self.told: list[tuple[str, str]] = [(message, place)]
         super().__init__(f"{place}: {message}" if place else message)
 
     @classmethod
     def several(cls, told: list[tuple[str, str]]) -> ProblemError:
         """Return one error that tells several defects, (message, place) each, a line each."""
         made = cls("\n".join(f"{place}: {message}" if place else message for message, place in told))
-        made.place = told[0][1]
+        made.place, made.told = told[0][1], told
         return made
 
 

@@ -1,5 +1,6 @@
 """Times and ratios that the documentation quotes stand in one file, which `make ratios` writes."""
 
+import importlib.util
 import re
 from pathlib import Path
 
@@ -41,3 +42,12 @@ def test_what_pages_include_is_there(page):
     text, measured = page.read_text(encoding="utf-8"), RATIOS.read_text(encoding="utf-8")
     for name in re.findall(r":start-after: <!-- (\w+) -->", text):
         assert marked(measured, name), f"{page.name} includes {name}"
+
+
+@pytest.mark.parametrize("script", sorted((ROOT / "tests" / "bench").glob("*.py")), ids=lambda p: p.name)
+def test_what_measures_can_be_loaded(script):
+    """Scripts that run for minutes find what they import, and read what they measure."""
+    spec = importlib.util.spec_from_file_location(f"bench_{script.stem}", script)
+    assert spec
+    assert spec.loader
+    spec.loader.exec_module(importlib.util.module_from_spec(spec))

@@ -13,6 +13,7 @@ import numpy as np
 from casadi_gnc.errors import GncError, LawError, ProblemError
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import asking, fitting
+from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
@@ -182,13 +183,11 @@ def _scheme(
     table: Any, law: type[Law], gains: Part, parts: _Parts, funnels: list[Funnel], timing: Timing, strict: bool
 ) -> Scheme:
     """Return a scheme; a `MisfitError` or a `GncError` says what does not fit."""
-    own = type(parts.craft).scheme_keys
-    keys = own.model_construct(**{name: getattr(table, name) for name in own.model_fields})
+    keys = _keys_of(table, parts.craft)
     actuation = actuation_of(parts.craft, keys)
-    why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
+    why = _misfit(table, law, parts, actuation)
     if why:
-        told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
-        raise MisfitError(f"{told}; `casadi-gnc laws` says which fits what", "law", "type")
+        raise MisfitError(why, "law", "type")
     named = list(law.errata) if table.as_printed is True else table.as_printed or []
     for name in named:
         if name not in law.errata:
@@ -215,6 +214,29 @@ def _scheme(
     except Exception as error:
         raise _about_law(error, law) from error
     return Scheme(table.name, made, actuation, table.feedback, table.title, keys)
+
+
+def _keys_of(table: Any, craft: Craft) -> Part:
+    """Return those keys of a scheme's table that its craft's actuation takes."""
+    own = type(craft).scheme_keys
+    return own.model_construct(**{name: getattr(table, name) for name in own.model_fields})
+
+
+def _misfit(table: Any, law: type[Law], parts: _Parts, actuation: Actuation) -> str:
+    """Return why a scheme's law cannot fly the craft whatever its gains, "" where it can."""
+    why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
+    told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
+    return f"{told}; `casadi-gnc laws` says which fits what" if why else ""
+
+
+def misfit(table: Any, law: type[Law], craft: Craft) -> str:
+    """Return why the law of a checked scheme's table cannot fly a craft; "" where it can, or the craft is not sound."""
+    parts = _Parts(craft)
+    try:
+        parts.ask()
+        return _misfit(table, law, parts, actuation_of(craft, _keys_of(table, craft)))
+    except (GncError, MisfitError):
+        return ""
 
 
 def _about_law(error: Exception, law: type[Law]) -> MisfitError:

@@ -77,6 +77,15 @@ class Complaints:
                 self.add((*key, *path), message)
         return None
 
+    def apart(self) -> Complaints:
+        """Return an empty list of complaints about the same document."""
+        return Complaints(self._document)
+
+    def join(self, others: Complaints) -> None:
+        """Note what others noted."""
+        for key, message in others._found:
+            self.add(key, message)
+
     @contextmanager
     def about(self, *key: str | int) -> Iterator[None]:
         """Note what is raised inside as being about a key; a `MisfitError` says which one below it."""

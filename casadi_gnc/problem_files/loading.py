@@ -98,7 +98,7 @@ def check_tables(document: Document, changes: Mapping[str, Any]) -> Checked:
             complaints.add((key,), "unknown key" + near_key(key, [*MissionTables.model_fields, *own, "scheme"]))
     common = complaints.checked(MissionTables, parts)
     craft = _craft(kind, data, own, complaints)
-    schemes = _schemes(kind, data.get("scheme"), complaints)
+    schemes = _schemes(kind, craft, data.get("scheme"), complaints)
     complaints.settle()
     assert common is not None
     assert craft is not None
@@ -145,7 +145,9 @@ def scheme_table(kind: type[Craft]) -> Any:
     return create_model("Scheme", __base__=(SchemeTable, kind.scheme_keys), __doc__=SchemeTable.__doc__)
 
 
-def _schemes(kind: type[Craft], tables: Any, complaints: Complaints) -> list[tuple[Any, type[Law], Part]]:
+def _schemes(
+    kind: type[Craft], craft: Craft | None, tables: Any, complaints: Complaints
+) -> list[tuple[Any, type[Law], Part]]:
     """Return the schemes' tables with their laws and gains; those that are wrong are noted and left out."""
     if not isinstance(tables, list) or not tables:
         complaints.add(("scheme",), "is missing; write one [[scheme]] or more")
@@ -154,25 +156,32 @@ def _schemes(kind: type[Craft], tables: Any, complaints: Complaints) -> list[tup
     for i, table in enumerate(tables):
         model = complaints.checked(scheme_table(kind), table, ("scheme", i))
         law = _law(table.get("law"), complaints, ("scheme", i, "law")) if isinstance(table, dict) else None
-        if model is None or law is None:
+        if law is None:
+            continue
+        key, wrong = ("scheme", i, "law"), complaints.apart()
+        given = {name: value for name, value in table["law"].items() if name != "type"}
+        gains = wrong.checked(law_table(law), given, key)
+        why = "" if gains is not None or model is None or craft is None else building.misfit(model, law, craft)
+        if why:  # gains of a law that cannot fly this craft need no mending
+            complaints.add((*key, "type"), why)
+            continue
+        complaints.join(wrong)
+        if model is None or gains is None:
             continue
         if model.name in names:
             complaints.add(("scheme", i, "name"), f"the name {model.name!r} is given twice")
         names.append(model.name)
-        found.append((model, *law))
+        found.append((model, law, gains))
     return found
 
 
-def _law(table: Any, complaints: Complaints, key: tuple[str | int, ...]) -> tuple[type[Law], Part] | None:
-    """Return class and gains of the law that a table names."""
+def _law(table: Any, complaints: Complaints, key: tuple[str | int, ...]) -> type[Law] | None:
+    """Return the class of the law that a table names."""
     if not isinstance(table, dict):
         return None  # said by the scheme's own table
     if not isinstance(table.get("type"), str):
         complaints.add((*key, "type"), f"is missing; it names the law, one of {', '.join(LAWS.names())}")
         return None
     with complaints.about(*key, "type"):
-        law = LAWS.find(table["type"], complaints.folder)
-        given = {name: value for name, value in table.items() if name != "type"}
-        gains = complaints.checked(law_table(law), given, key)
-        return None if gains is None else (law, gains)
+        return LAWS.find(table["type"], complaints.folder)
     return None

@@ -63,7 +63,9 @@ def load_sweeps(problem: str | Path) -> tuple[Sweep, ...]:
             try:
                 mission = load_document(document, {table.key: value})
             except ProblemError as error:
-                raise ProblemError(f"with {table.key} = {value!r}: {error}", place) from None
+                raise ProblemError.several(
+                    [(f"with {table.key} = {value!r}: {where}: {message}", place) for message, where in error.told]
+                ) from None
             missions.append(replace(mission, name=f"{mission.name}_{table.name}_{number}"))
         known = [metric.name for metric in missions[0].metrics] + list(StepStatus.__members__)
         if table.show not in known:

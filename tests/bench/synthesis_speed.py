@@ -20,7 +20,8 @@ from casadi_gnc.problem_files.synthesis_file import load_synthesis
 from casadi_gnc.synthesis.recipes.intermediate_observer import _between, _pose, uncoupled
 
 A, B, VARPI, S, MARGIN = np.array([[0, 1.0], [0, 0]]), np.array([[0], [0.05]]), 200.0, 0.3, 1e-6
-ONE_AXIS, SIX_STATES = (A, B), tuple(load_synthesis("shi2020/synthesis").arguments[name] for name in "AB")
+ONE_AXIS = (A, B)
+SIX_STATES = tuple(load_synthesis("shi2020/synthesis").recipe.arguments()[name] for name in "AB")
 GAMMA = 3.5  # a little above the smallest
 
 

@@ -93,7 +93,7 @@ D = [[0.0], [1.0]]
         (("B = [[0.0], [1.0]]", "B = [[0.0]]"), "B"),
         (("A = [[0.0, 1.0], [0.0, 0.0]]", "A = [[0.0, 1.0], [0.0]]"), "rows of different length: 2, 1"),
         (("D = [[0.0], [1.0]]", ""), "recipe.D: is missing"),
-        (('type = "state_feedback"', 'type = "magic"'), "unknown type 'magic'"),
+        (('type = "state_feedback"', 'type = "magic"'), "recipe.type: no recipe 'magic'; there is state_feedback"),
         (("A = [[0.0, 1.0]", "A = [[nan, 1.0]"), "recipe.A[1][1]"),
         (("D = ", "limit = 1.0\nD = "), "needs vertices to start from"),
         (("D = ", "half_widths = [1.0, 1.0]\nvertices = [[1.0, 1.0]]\nD = "), "either vertices or half_widths"),
@@ -149,4 +149,4 @@ def test_a_synthesis_that_fails_exits_with_1_and_gives_no_gains(tmp_path, change
 def test_unknown_back_end_is_told():
     done = run("shi2020/synthesis", "--backend", "magic")
     assert done.returncode == 2
-    assert "no synthesis back end 'magic'" in done.stderr
+    assert "no LMI back end 'magic'; there is clarabel" in done.stderr

@@ -1,11 +1,14 @@
-"""The house: imports go downward only, and public names are documented."""
+"""The house: imports go downward only and in no circle, and public names are documented."""
 
 import ast
 import importlib
 import inspect
 import pkgutil
+import re
 import subprocess
 import sys
+from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -15,7 +18,7 @@ import casadi_gnc
 ROOT = Path(casadi_gnc.__file__).parent
 #: Single modules at the top are the language of the house; every room stands on those with smaller numbers.
 FLOORS = {
-    **{path.stem: 0 for path in ROOT.glob("*.py") if path.stem not in ("__init__", "testing")},
+    **{path.stem: 0 for path in ROOT.glob("*.py") if path.stem != "__init__"},
     "mathematics": 1,
     "system": 1,
     "mechanics": 2,
@@ -43,15 +46,82 @@ def room(path: Path) -> str:
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
 
+def name_of(path: Path) -> str:
+    parts = ["casadi_gnc", *path.relative_to(ROOT).with_suffix("").parts]
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+NAMES = {name_of(path): path for path in MODULES}
+
+
+def imports(tree: ast.AST, package: str, *, typing: bool) -> Iterator[str]:
+    """Yield what a module imports from the house, in functions too; what only types need where that is wanted."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name.split(".")[0] == "casadi_gnc")
+        elif isinstance(node, ast.ImportFrom):
+            above = package.rsplit(".", node.level - 1)[0] if node.level else ""
+            home = ".".join(filter(None, (above, node.module)))
+            if home.split(".")[0] == "casadi_gnc":
+                inner = (f"{home}.{alias.name}" for alias in node.names)
+                yield from (name if name in NAMES else home for name in inner)
+        elif isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING") and not typing:
+            yield from imports(ast.Module(node.orelse, []), package, typing=typing)
+        else:
+            yield from imports(node, package, typing=typing)
+
+
+def imported(path: Path, *, typing: bool) -> set[str]:
+    package = name_of(path) if path.name == "__init__.py" else name_of(path).rpartition(".")[0]
+    return set(imports(ast.parse(path.read_text(encoding="utf-8")), package, typing=typing))
+
+
 def imported_rooms(path: Path) -> set[str]:
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("casadi_gnc"):
-            parts = node.module.split(".")
-            found.update([parts[1]] if len(parts) > 1 else [alias.name for alias in node.names])
-        elif isinstance(node, ast.Import):
-            found.update(alias.name.split(".")[1] for alias in node.names if alias.name.startswith("casadi_gnc."))
-    return found
+    return {name.split(".")[1] for name in imported(path, typing=True) if "." in name}
+
+
+def test_every_room_has_a_floor_and_every_floor_is_of_a_room():
+    rooms = {room(path) for path in MODULES if path.parent != ROOT}
+    assert set(FLOORS) - {path.stem for path in ROOT.glob("*.py")} == rooms
+
+
+def test_the_house_is_as_contributors_are_told():
+    text = (ROOT.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \| (.*) \|$", text, re.MULTILINE)
+    told = {name: int(floor) for floor, names in rows for name in re.findall(r"`(\w+)/`", names)}
+    assert told == {name: floor for name, floor in FLOORS.items() if floor} | {"casadi_gnc": 0}
+
+
+def test_imports_are_seen_wherever_they_stand():
+    text = """
+from __future__ import annotations
+import casadi_gnc.laws._law, casadi
+from casadi_gnc import errors
+from . import mission
+if TYPE_CHECKING:
+    from casadi_gnc.missions.scheme import Scheme
+else:
+    from ..tables.part import Part
+def late():
+    try:
+        from casadi_gnc.laws import Law
+    finally:
+        from .loop import Loop
+"""
+    seen = ["laws._law", "errors", "missions.mission", "tables.part", "laws", "missions.loop"]
+    tree, package = ast.parse(text), "casadi_gnc.missions"
+    assert list(imports(tree, package, typing=False)) == [f"casadi_gnc.{name}" for name in seen]
+    assert "casadi_gnc.missions.scheme" in imports(tree, package, typing=True)
+
+
+def test_no_circle_between_files():
+    """What runs is loaded in one order; imports for types alone may look back."""
+    graph = {name: imported(path, typing=False) - {name} for name, path in NAMES.items()}
+    assert not set().union(*graph.values()) - set(graph), "imports of modules that do not exist"
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail("a circle of imports: " + " <- ".join(error.args[1]))
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(ROOT).as_posix())

@@ -18,7 +18,8 @@ from casadi_gnc.checking import authority, check, funnels, geometry, noise, samp
 from casadi_gnc.checking.linear import LinearLoop, spectral_radius
 from casadi_gnc.checks import Check, worst
 from casadi_gnc.laws import Law, PerformanceFunnel
-from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.actuation import Actuation, Actuators
+from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.scheme import Funnel, Scheme
@@ -53,6 +54,26 @@ class Cart(Plant):
         return ca.vertcat(x[1], actuators + self.push * ca.sin(0.01 * t))
 
 
+class CartCraft(Craft):
+    """The cart, pushed by at most 1 N, and where it begins."""
+
+    push: float = 0.0
+    deviation: float = 0.0
+    begin: list[float] = [0.9, 0.0]
+
+    def plant(self):
+        return Cart(self.push, self.deviation)
+
+    def start(self):
+        return {"place": self.begin[:1], "speed": self.begin[1:]}
+
+    def actuators(self):
+        return Actuators(ca.DM.eye(1), [-1.0], [1.0], effort=EFFORT)
+
+    def regulated(self, mission):
+        return {"place": [0.0], "speed": [0.0]}
+
+
 @dataclass(frozen=True, eq=False)
 class Spring(Law):
     """Pull the cart home."""
@@ -66,18 +87,15 @@ class Spring(Law):
 
 
 def mission(law=None, funnel=(), start=(0.9, 0.0), h=0.1, mode="sampled", **plant) -> Mission:
-    actuation = Actuation(
-        ca.DM.eye(1), [-1.0], [1.0], float("inf"), [-1.0], [1.0], Direct(), effort=Layout((Signal("force", 1, "N"),))
-    )
+    craft = CartCraft(begin=start, **plant)
+    actuation = Actuation.of(craft.actuators(), [1.0], Direct())
     made = law or Spring(hold=h if mode == "sampled" else 0.0)
     return Mission(
         name="cart",
-        truth=Cart(**plant),
-        start=list(start),
+        craft=craft,
         timing=Timing(mode, h, 100.0),
         schemes=(Scheme("spring", made, actuation),),
         funnels=funnel,
-        target={"place": [0.0], "speed": [0.0]},
     )
 
 
@@ -170,15 +188,22 @@ def test_static_demand_looks_between_the_extremes_of_single_axes():
         def command(self, t, y, m):
             return -y[:2] - 2 * y[2:]
 
-    force = Layout((Signal("force", 2, "N"),))
-    actuation = Actuation(TURNED, [-0.7] * 2, [0.7] * 2, float("inf"), [-5.0] * 2, [5.0] * 2, Direct(), effort=force)
-    chosen = replace(
-        mission(),
-        truth=Plane(),
-        start=[0.0] * 4,
-        schemes=(Scheme("springs", Springs(hold=0.1), actuation),),
-        target={"place": [0.0] * 2, "speed": [0.0] * 2},
-    )
+    class PlaneCraft(Craft):
+        def plant(self):
+            return Plane()
+
+        def start(self):
+            return {"place": [0.0] * 2, "speed": [0.0] * 2}
+
+        def actuators(self):
+            return Actuators(TURNED, [-0.7] * 2, [0.7] * 2, effort=Layout((Signal("force", 2, "N"),)))
+
+        def regulated(self, mission):
+            return self.start()
+
+    craft = PlaneCraft()
+    actuation = Actuation.of(craft.actuators(), [5.0] * 2, Direct())
+    chosen = replace(mission(), craft=craft, schemes=(Scheme("springs", Springs(hold=0.1), actuation),))
     found = only(check(chosen), "authority.static_demand")
     assert found.value == pytest.approx(0.8 / 0.7, rel=1e-3)  # the grid of times passes within 1 degree of it
     assert found.verdict == "fail"

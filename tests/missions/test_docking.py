@@ -301,7 +301,10 @@ BAD = {
     "overlap": (lambda d: d["fault"]["piece"][0].update(until_s=7.0), "from 2 s and from 5 s overlap"),
     "backwards": (lambda d: d["fault"]["piece"][0].update(until_s=1.0), "1 is not after from_s 2"),
     "gain of wrong shape": (lambda d: d["scheme"][0]["law"]["controller_gain"].pop(), "controller_gain"),
-    "law of another craft": (lambda d: d["scheme"][0].update(law={"type": "rate_damping"}), "type"),
+    "law of another craft": (
+        lambda d: d["scheme"][0].update(law={"type": "rate_damping"}),
+        "law.type: the law 'rate_damping' does not fit",
+    ),
     "unknown erratum": (lambda d: d["scheme"][0].update(as_printed=["observer_stop"]), "no erratum"),
     "incredible start": (lambda d: d["initial"].update(position_m=[2e4, 0, 0]), "largest credible position"),
 }
@@ -316,6 +319,6 @@ def test_bad_files_are_refused_with_their_place(change):
 
 
 def test_what_a_reader_must_know_is_noted():
-    assert "perigee" in loaded(lambda data: data["orbit"].update(eccentricity=0.5)).notes[0]
-    assert ["force itself" in note for note in printed().notes] == [True]
-    assert not casadi_gnc.load("shi2020/docking").notes
+    assert "perigee" in loaded(lambda data: data["orbit"].update(eccentricity=0.5)).craft.notes()[0]
+    assert ["force itself" in note for note in printed().craft.notes()] == [True]
+    assert not casadi_gnc.load("shi2020/docking").craft.notes()

@@ -5,6 +5,7 @@ from dataclasses import replace
 import casadi as ca
 import numpy as np
 import pytest
+from other_truths import with_plant
 
 import casadi_gnc
 from casadi_gnc.errors import LawError
@@ -186,11 +187,12 @@ def test_the_narrowest_funnel_is_the_edge_of_what_flies(case1, factor, dies):
     width = factor * SampledFunnel(law, "position").narrowest()
     still = replace(law.position_funnel, start=width * ca.DM.ones(3), floor=width * ca.DM.ones(3))
     changed = replace(case1.scheme("funnels"), law=replace(law, position_funnel=still))
+    timed = case1.with_timing(mode="sampled", sample_period=0.01, duration=20.0, record_every=1)
+    rest = {"mrp": [0.0] * 3, "rate": [0.0] * 3, "velocity": [0.0] * 3}
     mission = replace(
-        case1.with_timing(mode="sampled", sample_period=0.01, duration=20.0, record_every=1),
-        truth=replace(case1.truth, disturbance=OrbitalDisturbance()),
+        with_plant(timed, replace(case1.truth, disturbance=OrbitalDisturbance())),
         schemes=(changed,),
-        start=[*[0.0] * 6, 1e-6, *[0.0] * 5],
+        start_from={**rest, "position": [1e-6, 0.0, 0.0]},
     )
     swing = np.abs(casadi_gnc.fly(mission, engine="vm")["position"][:, 0])
     assert (swing[-500:].max() < swing[:500].max()) == dies

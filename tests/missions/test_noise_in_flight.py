@@ -14,6 +14,7 @@ import casadi_gnc
 from casadi_gnc.allocation import Direct
 from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
@@ -47,6 +48,19 @@ class Wanderer(Plant):
         return {StepStatus.KEEP_OUT_ENTERED: ca.norm_2(x[:3]) < 0.2}
 
 
+class WandererCraft(Craft):
+    """The point, where it begins, and a note."""
+
+    def plant(self):
+        return Wanderer()
+
+    def start(self):
+        return {"place": [1.0, -2.0, 0.5], "angle": [-1.5]}
+
+    def notes(self):
+        return ("a note",)
+
+
 @dataclass(frozen=True, eq=False)
 class Pull(Law):
     """Pull to zero."""
@@ -78,14 +92,12 @@ def mission(**changes) -> Mission:
     narrow = PerformanceFunnel(*(ca.DM([value]) for value in (3.0, 0.5, 0.1, 1.0, 1.0)))
     made = Mission(
         name="wander",
-        truth=Wanderer(),
-        start=[1.0, -2.0, 0.5, -1.5],
+        craft=WandererCraft(),
         timing=Timing("sampled", 0.1, 20.0, 2),
         schemes=(Scheme("pull", Pull(hold=0.1), actuation),),
         metrics=(Metric("nearest", "least", "distance", unit="m"),),
         funnels=(Funnel("place", wide), Funnel("angle", narrow)),
         noise=Noise(seed=3, every=2, truncation=3.0),
-        notes=("a note",),
     )
     return replace(made, **changes)
 
