@@ -8,7 +8,6 @@ negative real part turns a stabilising command into a destabilising one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import casadi as ca
 import numpy as np
