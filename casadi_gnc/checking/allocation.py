@@ -8,7 +8,6 @@ negative real part turns a stabilising command into a destabilising one.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -89,8 +88,7 @@ def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
     """
     actuation, count = scheme.actuation, mission.truth.inputs.size
     matrix = actuation.matrix(mission.truth.measurement.split(mission.first_measurement()))
-    allocator: Any = actuation.allocator
-    if isinstance(allocator, PseudoInverse) and not leaves_none_out(matrix):
+    if isinstance(actuation.allocator, PseudoInverse) and not leaves_none_out(matrix):
         return np.linalg.pinv(np.array(ca.DM(matrix)))
     lower, upper, rest = np.array(actuation.lower), np.array(actuation.upper), np.zeros(count)
     if actuation.is_symbolic:
@@ -103,7 +101,7 @@ def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
         def allocate(u: np.ndarray) -> np.ndarray:
             return np.array(ca.DM(expression(y, u, rest, lower, upper)).full()).ravel()  # type: ignore[arg-type]
     else:
-        solve = allocator.start()
+        solve = scheme.actuation.allocator.start()
 
         def allocate(u: np.ndarray) -> np.ndarray:
             return np.array(solve(u, rest.copy(), lower, upper)[0])

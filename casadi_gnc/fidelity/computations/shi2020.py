@@ -8,6 +8,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.optimize import linprog
 
 import casadi_gnc
@@ -314,7 +315,7 @@ def disturbance_error(after_s: float) -> float:
 def utilisation(scheme: str) -> float:
     """Return the integral of |u|/30 N over the flight, [s]."""
     flight = _flown(scheme)
-    return float(np.trapezoid(np.linalg.norm(flight["limited"], axis=1), flight.time) / _data()["limit"])
+    return float(trapezoid(np.linalg.norm(flight["limited"], axis=1), flight.time) / _data()["limit"])
 
 
 def mean_utilisation(scheme: str) -> float:
