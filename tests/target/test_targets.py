@@ -81,8 +81,8 @@ def without_allocation(real: str, folder, steps: int = 300):
     direct = dataclasses.replace(
         told, effectiveness=ca.DM.eye(3), lower=told.limit_below, upper=told.limit_above, allocator=Direct()
     )
-    mission = mission.with_scheme("funnel_pinv", actuation=direct)
-    mission = with_plant(mission, dataclasses.replace(mission.truth, effectiveness=ca.DM.eye(3)))
+    scheme = dataclasses.replace(mission.scheme("funnel_pinv"), actuation=direct)
+    mission = with_plant(mission, dataclasses.replace(mission.truth, effectiveness=ca.DM.eye(3)), schemes=[scheme])
     controller, options = describe(mission), Options("slew", real)
     header = package.replay_header(controller, options, steps)
     package.put(folder, {**package.flight_files(controller, options), "test/replay.h": header})
