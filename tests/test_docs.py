@@ -2,6 +2,8 @@
 
 import doctest
 import re
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -51,3 +53,15 @@ def test_links_lead_to_files():
         for target in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
             if "://" not in target:
                 assert (page.parent / target).exists(), f"{page.name} -> {target}"
+
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_what_pages_import_is_there(page):
+    """In blocks that are not run, too: names move when rooms do."""
+    text = page.read_text(encoding="utf-8")
+    for module, names in re.findall(r"^(?:>>> )?from (casadi_gnc[\w.]*) import ([\w, ]+)", text, re.MULTILINE):
+        for name in (each.split(" as ")[0].strip() for each in names.split(", ")):
+            assert hasattr(import_module(module), name) or find_spec(f"{module}.{name}"), f"{module} has no {name}"
