@@ -49,7 +49,7 @@ class Mission:
     title, source : for whoever reads the results.
     start_from : states that begin otherwise than the craft says, by signal.
     checks : functions (mission, scheme) that yield further checks of this mission.
-    origin : the file that it was read from, if it was.
+    origin : the file that it was read from, if it was; `dataclasses.replace`, which may change anything, forgets it.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class Mission:
     source: str = ""
     start_from: Mapping[str, Sequence[float]] = field(default_factory=dict)
     checks: Sequence[Callable[[Mission, Scheme], Iterable[Check]]] = ()
-    origin: Origin | None = None
+    origin: Origin | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         fitting.refuse_strangers(self)
@@ -133,8 +133,8 @@ class Mission:
 
         Raises `LawError` where a law cannot work at that sample period.
         """
-        changed = replace(
-            self, timing=replace(self.timing, **changes), origin=self._noted(keys_of_timing(self.timing, changes))
+        changed = self._noting(
+            replace(self, timing=replace(self.timing, **changes)), keys_of_timing(self.timing, changes)
         )
         for scheme in changed.schemes:
             scheme.law.check_hold()
@@ -152,14 +152,20 @@ class Mission:
         paths = {f"scheme.{scheme.name}.law.{key}": value for key, value in changes.items()}
         paths |= {f"scheme.{scheme.name}.{key}": value for key, value in own.items()}
         changed = replace(scheme, **{**own, "law": replace(law, **changes) if changes else law})
-        return replace(self, schemes=(changed,), origin=self._noted(paths))
+        return self._noting(replace(self, schemes=(changed,)), paths)
 
-    def _noted(self, changes: Mapping[str, Any]) -> Origin | None:
-        return None if self.origin is None else self.origin.with_changes(changes)
+    def _noting(self, changed: Mission, paths: Mapping[str, Any]) -> Mission:
+        """Return a changed mission that has the file of this one, with the changes."""
+        return changed if self.origin is None else changed.read_from(self.origin.with_changes(paths))
+
+    def read_from(self, origin: Origin | None) -> Mission:
+        """Note the file of a mission that was just made, and return the mission."""
+        object.__setattr__(self, "origin", origin)
+        return self
 
     def with_craft(self, craft: Craft) -> Mission:
         """Return the mission of another craft; what the schemes believe stays."""
-        return replace(self, craft=craft, origin=None)
+        return replace(self, craft=craft)
 
     def controller(self, scheme: str | None = None) -> Stepper:
         """Return the sampled controller of a scheme, to be stepped with measurements from elsewhere.
@@ -229,7 +235,9 @@ class Mission:
 def _restored(files: tuple[GuestFile, ...], content: bytes) -> Mission:
     """Return a mission from a pickle; the code that it needs is run first."""
     guests.run_all(files)
-    return Mission(**pickle.loads(content))
+    own = pickle.loads(content)
+    origin = own.pop("origin")
+    return Mission(**own).read_from(origin)
 
 
 def _flat(values: Any) -> list[float]:

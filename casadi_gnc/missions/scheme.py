@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.missions.actuation import Actuation
-from casadi_gnc.tables.part import Part
+from casadi_gnc.tables.part import NAME, Part
 
 Feedback = Literal["achieved", "wanted"]
 MetricKind = Literal["settling", "reaching", "peak", "least", "final", "mean", "sample_sum"]
@@ -20,7 +21,7 @@ class Scheme:
 
     Parameters
     ----------
-    name : of files that are written.
+    name : letters, digits and _; of files that are written.
     law : what commands an effort.
     actuation : how it becomes actuator commands; `Craft.actuation` makes one.
     feedback : what observers and anti-windup are told was done: "achieved" by the actuators, or "wanted".
@@ -36,6 +37,8 @@ class Scheme:
     keys: Part | None = None
 
     def __post_init__(self) -> None:
+        if not re.fullmatch(NAME, str(self.name)):
+            raise FlightError(f"a scheme is named {self.name!r}, expected letters, digits and _, the first a letter")
         if self.feedback not in ("achieved", "wanted"):
             raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
 

@@ -17,7 +17,6 @@ from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.origin import Origin
 from casadi_gnc.missions.parts import actuation_of, belief_of, plant_of, start_of
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.timing import Noise, Timing
@@ -91,11 +90,6 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
             metrics.append(fitting.complete(made, _metric(table)))
     complaints.settle()
     return replace(made, metrics=metrics)
-
-
-def with_origin(made: Mission, origin: Origin) -> Mission:
-    """Return the mission with the file that it came from."""
-    return replace(made, origin=origin)
 
 
 @contextmanager

@@ -80,7 +80,7 @@ def load_document(document: Document, changes: Mapping[str, Any] | None = None, 
         checked = check_tables(document, changes)
         mission = building.mission(checked, strict=strict)
     origin = Origin(document.path.name, document.text, dict(changes), tuple(files), document.folder)
-    return building.with_origin(mission, origin)
+    return mission.read_from(origin)
 
 
 def check_tables(document: Document, changes: Mapping[str, Any]) -> Checked:

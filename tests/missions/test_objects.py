@@ -115,6 +115,24 @@ def test_changes_of_a_loaded_mission_are_paths_of_its_file(tmp_path):
     assert loaded.with_scheme("observer_pinv", law=loaded.scheme("damping_pinv").law).origin is None
 
 
+def test_what_may_change_anything_forgets_the_file():
+    """The digest of a mission that is no longer its file is no longer the file's; a pickle's still is."""
+    from dataclasses import replace
+
+    loaded = gnc.load("huang2020/detumble")
+    law = replace(loaded.scheme().law, rate_gain=0.7)
+    other = replace(loaded, schemes=[replace(loaded.scheme(), law=law)])
+    assert other.origin is None
+    assert other.digest != loaded.digest
+    assert pickle.loads(pickle.dumps(loaded)).origin == loaded.origin
+
+
+@pytest.mark.parametrize("name", ["a b/c", "../up", "", "1st", "lineend\n"])
+def test_a_scheme_has_a_name_that_files_can_have(name):
+    with pytest.raises(FlightError, match="expected letters, digits and _, the first a letter"):
+        gnc.Scheme(name, RateDamping(body=RigidBody(ca.DM(INERTIA)), rate_gain=3.0), craft().actuation())
+
+
 def test_a_mission_that_is_no_longer_its_file_keeps_its_controller(tmp_path):
     from dataclasses import replace
 

@@ -13,4 +13,4 @@ def with_plant(mission: Mission, plant: Plant, schemes: Sequence[Scheme] | None 
     kind = type(mission.craft)
     other = type("Other", (kind,), {"plant": lambda self: plant})
     made = other.model_construct(**dict(mission.craft))
-    return replace(mission, craft=made, schemes=schemes or mission.schemes, origin=None)
+    return replace(mission, craft=made, schemes=schemes or mission.schemes)
