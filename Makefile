@@ -1,6 +1,6 @@
 # make demo     fly the de-tumble mission; pictures and table in out/detumble (the first time about a minute more, to
 #               install what it needs into .venv)
-# make test     style, types and the fast tests: about seven minutes on two cores
+# make test     style, types and the fast tests: about ten minutes on two cores
 # make test-all style, types and every test; needs clang, clang-tidy, cppcheck, g++ and `make targets`, and skips by
 #               name what a missing one prevents (with CI=true: fails)
 # make gates    the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers; needs
