@@ -23,7 +23,7 @@ IN_THE_MISSION = {
     "no class": ("./sail.py:SailCraft", "./sail.py:Saleboat", "no 'Saleboat'; it defines Sail, SailCraft, NadirPid"),
     "a law for a craft": ("./sail.py:SailCraft", "./sail.py:NadirPid", "which is no craft; expected a class derived"),
     "out of the folder": ("./sail.py:SailCraft", "./../sail.py:SailCraft", "leads out of the problem file's folder"),
-    "an absolute path": ("./sail.py:SailCraft", "/tmp/sail.py:SailCraft", 'write "./file.py:Class"'),
+    "an absolute path": ("./sail.py:SailCraft", "/opt/sail.py:SailCraft", 'write "./file.py:Class"'),
     "a module of ours": ("./sail.py:SailCraft", "casadi_gnc", "no craft 'casadi_gnc'; there is combined_spacecraft"),
     "a wrong key": ("area_m2 = 32.0", "mode_hz = 3.0", "unknown key; did you mean mode_Hz?"),
     "a wrong number": ("area_m2 = 32.0", "area_m2 = -1.0", "greater than 0, got -1.0"),
