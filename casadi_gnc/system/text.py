@@ -80,14 +80,19 @@ def c_string(text: object) -> str:
     >>> print(c_string('50 % "off"??/' + chr(10)))
     "50 % \"off\"\?\?/\012"
     """
+    return '"' + _in_octal(str(text).encode("utf-8", "backslashreplace"), escaped='"\\?') + '"'
+
+
+def _in_octal(content: bytes, escaped: str) -> str:
+    """Return bytes as printable ASCII: a backslash before characters that need it, octal codes for what has no form."""
     parts = []
-    for byte in str(text).encode("utf-8", "backslashreplace"):
+    for byte in content:
         character = chr(byte)
-        if character in '"\\?':
+        if character in escaped:
             parts.append(f"\\{character}")
         else:
             parts.append(character if 32 <= byte < 127 else f"\\{byte:03o}")
-    return '"' + "".join(parts) + '"'
+    return "".join(parts)
 
 
 def xml(text: object) -> str:
@@ -166,14 +171,8 @@ def shell(text: object) -> str:
     said = str(text)
     if not _REFUSED.search(said) and "\n" not in said and "\t" not in said:
         return shlex.quote(said)
-    parts = []
-    for byte in said.encode("utf-8", "surrogateescape" if _is_escaped(said) else "backslashreplace"):
-        character = chr(byte)
-        if character in "'\\":
-            parts.append(f"\\{character}")
-        else:
-            parts.append(character if 32 <= byte < 127 else f"\\{byte:03o}")
-    return "$'" + "".join(parts) + "'"
+    content = said.encode("utf-8", "surrogateescape" if _is_escaped(said) else "backslashreplace")
+    return "$'" + _in_octal(content, escaped="'\\") + "'"
 
 
 def _is_escaped(text: str) -> bool:
