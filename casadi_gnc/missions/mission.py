@@ -7,7 +7,7 @@ import hashlib
 import pickle
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,10 +17,11 @@ from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.guests import GuestFile
-from casadi_gnc.missions import fitting, functions, parts, probing
+from casadi_gnc.missions import fitting, functions, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
 from casadi_gnc.missions.origin import Origin, keys_of_timing
+from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.stepper import Stepper
@@ -49,6 +50,7 @@ class Mission:
     title, source : for whoever reads the results.
     start_from : states that begin otherwise than the craft says, by signal.
     checks : functions (mission, scheme) that yield further checks of this mission.
+    parts : of the craft, where it has been asked for them.
     origin : the file that it was read from, if it was; `dataclasses.replace`, which may change anything, forgets it.
 
     Raises
@@ -75,10 +77,13 @@ class Mission:
     source: str = ""
     start_from: Mapping[str, Sequence[float]] = field(default_factory=dict)
     checks: Sequence[Callable[[Mission, Scheme], Iterable[Check]]] = ()
+    parts: InitVar[Parts | None] = None
     origin: Origin | None = field(default=None, init=False)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, parts: Parts | None) -> None:
         fitting.refuse_strangers(self)
+        if parts is not None:
+            self.__dict__["_parts"] = parts
         hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
         held = (
             each if each.law.hold == hold else replace(each, law=replace(each.law, hold=hold)) for each in self.schemes
@@ -90,14 +95,18 @@ class Mission:
         object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
 
     @cached_property
+    def _parts(self) -> Parts:
+        return Parts(self.craft)
+
+    @cached_property
     def truth(self) -> Plant:
         """The plant: what truly moves, and what the sensors say."""
-        return parts.plant_of(self.craft)
+        return self._parts.plant
 
     @cached_property
     def start(self) -> list[float]:
         """The plant's state at t = 0, in its order."""
-        by_signal = {**parts.start_of(self.craft, self.truth), **self.start_from}
+        by_signal = {**self._parts.start, **self.start_from}
         return [float(value) for name in self.truth.state.names for value in _flat(by_signal[name])]
 
     @cached_property
@@ -134,7 +143,8 @@ class Mission:
         Raises `LawError` where a law cannot work at that sample period.
         """
         changed = self._noting(
-            replace(self, timing=replace(self.timing, **changes)), keys_of_timing(self.timing, changes)
+            replace(self, timing=replace(self.timing, **changes), parts=self._parts),
+            keys_of_timing(self.timing, changes),
         )
         for scheme in changed.schemes:
             scheme.law.check_hold()
@@ -152,11 +162,16 @@ class Mission:
         paths = {f"scheme.{scheme.name}.law.{key}": value for key, value in changes.items()}
         paths |= {f"scheme.{scheme.name}.{key}": value for key, value in own.items()}
         changed = replace(scheme, **{**own, "law": replace(law, **changes) if changes else law})
-        return self._noting(replace(self, schemes=(changed,)), paths)
+        return self._noting(replace(self, schemes=(changed,), parts=self._parts), paths)
 
     def _noting(self, changed: Mission, paths: Mapping[str, Any]) -> Mission:
         """Return a changed mission that has the file of this one, with the changes."""
         return changed if self.origin is None else changed.read_from(self.origin.with_changes(paths))
+
+    def measured_by(self, metrics: Sequence[Metric]) -> Mission:
+        """Note the metrics, completed, of a mission that was just made, and return the mission."""
+        object.__setattr__(self, "metrics", tuple(metrics))
+        return self
 
     def read_from(self, origin: Origin | None) -> Mission:
         """Note the file of a mission that was just made, and return the mission."""

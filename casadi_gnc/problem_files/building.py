@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
-import numpy as np
 
 from casadi_gnc.errors import GncError, LawError, ProblemError
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
-from casadi_gnc.missions import asking, fitting
+from casadi_gnc.missions import fitting
 from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.parts import actuation_of, belief_of, plant_of, start_of
+from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.timing import Noise, Timing
 from casadi_gnc.problem_files.document import Complaints
@@ -43,9 +41,9 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     """
     document, common, craft = checked.document, checked.common, checked.craft
     complaints = Complaints(document)
-    parts = _Parts(craft)
+    parts = Parts(craft)
     with complaints.about("spacecraft", "model"):
-        parts.ask()
+        _ = parts.measured, parts.belief
     complaints.settle()
     for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
         complaints.add(misfit.path, str(misfit))
@@ -81,6 +79,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
             title=common.title,
             source=common.source,
             checks=further,
+            parts=parts,
         )
     complaints.settle()
     assert made is not None
@@ -89,7 +88,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
         with complaints.about("metric", i, "signal"):
             metrics.append(fitting.complete(made, _metric(table)))
     complaints.settle()
-    return replace(made, metrics=metrics)
+    return made.measured_by(metrics)
 
 
 @contextmanager
@@ -102,32 +101,6 @@ def _about_parts(complaints: Complaints, schemes: list[str]) -> Iterator[None]:
         complaints.add(place, str(error))
     except GncError as error:
         complaints.add(("spacecraft", "model"), str(error))
-
-
-class _Parts:
-    """Ask a craft once for what building a mission needs of it."""
-
-    def __init__(self, craft: Craft) -> None:
-        self.craft = craft
-
-    def ask(self) -> None:
-        """Ask for plant, start and belief."""
-        self.plant, self.believed = plant_of(self.craft), belief_of(self.craft)
-        start = start_of(self.craft, self.plant)
-        x = ca.vertcat(*(ca.DM(start[name]) for name in self.plant.state.names))
-        quiet = ca.DM.zeros(self.plant.noise.size)
-        told = asking.ask(self.plant, "measure", 0.0, x, quiet)
-        seen = asking.column(self.plant, "measure", told, self.plant.measurement)
-        self.measured = list(np.array(ca.DM(seen)).ravel())
-
-    def incredible(self) -> Iterator[MisfitError]:
-        """Yield starts that the sensors could not measure: a controller has no good value before them."""
-        layout = self.plant.measurement
-        for signal in layout.signals:
-            largest = max((abs(value) for value in self.measured[layout.place(signal.name)]), default=0.0)
-            if largest > signal.limit:
-                message = f"{largest:g} is beyond the largest credible {signal.name}, {signal.limit:g}"
-                yield MisfitError(message, *self.craft.key_of(signal.name))
 
 
 def _timing(given: TimingTable) -> Timing:
@@ -153,7 +126,7 @@ def _noise(table: NoiseTable, timing: Timing) -> Noise:
     return Noise(table.seed, round(every), table.truncation_sigma or float("inf"))
 
 
-def _funnel(table: FunnelTable, parts: _Parts) -> Funnel:
+def _funnel(table: FunnelTable, parts: Parts) -> Funnel:
     """Return one of the mission's funnels; the start must lie inside."""
     measured = parts.plant.measurement
     if table.signal not in measured:
@@ -174,11 +147,11 @@ def _funnel(table: FunnelTable, parts: _Parts) -> Funnel:
 
 
 def _scheme(
-    table: Any, law: type[Law], gains: Part, parts: _Parts, funnels: list[Funnel], timing: Timing, strict: bool
+    table: Any, law: type[Law], gains: Part, parts: Parts, funnels: list[Funnel], timing: Timing, strict: bool
 ) -> Scheme:
     """Return a scheme; a `MisfitError` or a `GncError` says what does not fit."""
     keys = _keys_of(table, parts.craft)
-    actuation = actuation_of(parts.craft, keys)
+    actuation = parts.actuation(keys)
     why = _misfit(table, law, parts, actuation)
     if why:
         raise MisfitError(why, "law", "type")
@@ -198,7 +171,7 @@ def _scheme(
             )
         given[key] = bounds
     if law.belief_kind() is not None:
-        given["body"] = parts.believed
+        given["body"] = parts.belief
     try:
         made = law(hold=timing.sample_period if timing.mode == "sampled" else 0.0, printed=frozenset(named), **given)
         if strict:
@@ -216,19 +189,18 @@ def _keys_of(table: Any, craft: Craft) -> Part:
     return own.model_construct(**{name: getattr(table, name) for name in own.model_fields})
 
 
-def _misfit(table: Any, law: type[Law], parts: _Parts, actuation: Actuation) -> str:
+def _misfit(table: Any, law: type[Law], parts: Parts, actuation: Actuation) -> str:
     """Return why a scheme's law cannot fly the craft whatever its gains, "" where it can."""
-    why = list(fitting.misfits(law, parts.plant.measurement, parts.believed, actuation.effort))
+    why = list(fitting.misfits(law, parts.plant.measurement, parts.belief, actuation.effort))
     told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
     return f"{told}; `casadi-gnc laws` says which fits what" if why else ""
 
 
 def misfit(table: Any, law: type[Law], craft: Craft) -> str:
     """Return why the law of a checked scheme's table cannot fly a craft; "" where it can, or the craft is not sound."""
-    parts = _Parts(craft)
+    parts = Parts(craft)
     try:
-        parts.ask()
-        return _misfit(table, law, parts, actuation_of(craft, _keys_of(table, craft)))
+        return _misfit(table, law, parts, parts.actuation(_keys_of(table, craft)))
     except (GncError, MisfitError):
         return ""
 
