@@ -28,7 +28,8 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.allocation import AllocationProblem
-from casadi_gnc.errors import AllocationError, BenchmarkError
+from casadi_gnc.errors import AllocationError, BenchmarkError, ProblemError
+from casadi_gnc.system import csv_file
 
 _NAMES = ("B", "v", "plim", "rlim", "T", "u", "wu", "gamma")
 
@@ -95,23 +96,26 @@ def read_outside(path: Path) -> Samples:
     commands = _columns(path, "v", given["v"], efforts)
     if not len(commands):
         raise BenchmarkError(f"{path}: v has no commands")
+    weights = np.ravel(given.get("wu", np.ones(1)))
+    if len(weights) not in (1, count):
+        raise BenchmarkError(f"{path}: wu has {len(weights)} entries, expected 1 or {count}")
     try:
         problem = AllocationProblem(
             matrix,
             limits[:, 0],
             limits[:, 1],
-            effort_weight=np.ravel(given.get("wu", np.ones(1))) * np.ones(count),
+            effort_weight=weights * np.ones(count),
             change_weight=0.0,
             accuracy_weight=float(np.ravel(given.get("gamma", np.array([1e6])))[0]),
         )
-    except (AllocationError, ValueError) as error:
+    except AllocationError as error:
         raise BenchmarkError(f"{path}: {error}") from None
     previous = _columns(path, "u", given["u"], count) if "u" in given else _before(problem, commands)
     if len(previous) != len(commands):
         raise BenchmarkError(f"{path}: u has {len(previous)} samples, v {len(commands)}")
     samples = boxed(problem, commands, previous)
     if ("rlim" in given) != ("T" in given):
-        raise BenchmarkError(f"{path}: rlim and T belong together; give both or neither")
+        raise BenchmarkError(f"{path}: {_without_period(path, given)}")
     if "rlim" not in given:
         return samples
     rates = _shaped(path, "rlim", given["rlim"], count, 2) * float(np.ravel(given["T"])[0])
@@ -122,6 +126,22 @@ def read_outside(path: Path) -> Samples:
     return Samples(problem, commands, previous, lower, upper)
 
 
+def _without_period(path: Path, given: dict[str, np.ndarray]) -> str:
+    """Return what is wrong where either rlim or T is missing, and what there is in its place."""
+    if "T" in given:
+        return "rlim is missing: it belongs to T; give both or neither"
+    alike = [] if path.is_dir() else [name for name in _variables(path) if name[:1] in "Tt" and name != "T"]
+    found = f"; there is {', '.join(alike[:5])}: save one of them as T" if alike else ""
+    return f"T, the sample period in seconds, is missing: it belongs to rlim; give both or neither{found}"
+
+
+def _variables(path: Path) -> list[str]:
+    """Return the names of all variables of a .mat file."""
+    from scipy.io import whosmat
+
+    return [name for name, _, _ in whosmat(str(path))]
+
+
 def _before(problem: AllocationProblem, commands: np.ndarray) -> np.ndarray:
     forces = np.clip(commands @ np.linalg.pinv(problem.effectiveness).T, problem.lower, problem.upper)
     start = np.clip(np.zeros(problem.count), problem.lower, problem.upper)
@@ -130,40 +150,36 @@ def _before(problem: AllocationProblem, commands: np.ndarray) -> np.ndarray:
 
 def _table(path: Path) -> tuple[list[str], np.ndarray]:
     """Return the header's names and the numbers, (K, columns)."""
-    lines = _lines(path)
-    if not lines:
-        raise BenchmarkError(f"{path} is empty; expected a line of column names and rows of numbers")
-    names = [name.strip() for name in lines[0][1].split(",")]
-    return names, _numbers(path, lines[1:], len(names))
+    table = csv_file.read_table(path)
+    return table.names, _finite(path, [line for line, _ in table.rows], table.column_numbers(table.names))
 
 
-def _numbers(path: Path, lines: list[tuple[int, str]], columns: int | None = None) -> np.ndarray:
-    """Return the rows of numbered lines, all of one length."""
-    rows = []
-    for number, line in lines:
-        try:
-            row = [float(entry) for entry in line.split(",")]
-        except ValueError as error:
-            raise BenchmarkError(f"{path}, line {number}: {error}") from None
-        columns = columns or len(row)
-        if len(row) != columns or not np.all(np.isfinite(row)):
-            raise BenchmarkError(f"{path}, line {number}: expected {columns} finite numbers, got {line[:60]!r}")
-        rows.append(row)
-    return np.array(rows).reshape(len(rows), columns or 0)
+def _matrix(path: Path) -> np.ndarray:
+    """Return the numbers of a file without a header, rows of one length."""
+    rows = csv_file.read_rows(path)
+    wide = len(rows[0][1]) if rows else 0
+    names = [str(column) for column in range(1, wide + 1)]
+    for line, row in rows:
+        if len(row) != wide:
+            raise ProblemError(
+                f"{csv_file.entries(len(row))}, expected {wide} as in the first row", f"{path.name}, line {line}"
+            )
+    numbers = csv_file.Table(path, names, 0, rows).column_numbers(names)
+    return _finite(path, [line for line, _ in rows], numbers).reshape(len(rows), wide)
 
 
-def _lines(path: Path) -> list[tuple[int, str]]:
-    """Return number and text of the lines that are neither empty nor comments."""
-    try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise BenchmarkError(f"{path} cannot be read as UTF-8 text: {error}") from None
-    return [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
+def _finite(path: Path, lines: list[int], numbers: list[list[float]]) -> np.ndarray:
+    """Return numbers as an array; raise `ProblemError` for the first line with one that is not finite."""
+    found = np.array(numbers)
+    for line, row in zip(lines, found, strict=True):
+        if not np.all(np.isfinite(row)):
+            raise ProblemError("has an entry that is not finite", f"{path.name}, line {line}")
+    return found
 
 
 def _folder(path: Path) -> dict[str, np.ndarray]:
     files = {name: path / f"{name}.csv" for name in _NAMES if (path / f"{name}.csv").is_file()}
-    return {name: _numbers(file, _lines(file)) for name, file in files.items()}
+    return {name: _matrix(file) for name, file in files.items()}
 
 
 def _mat(path: Path) -> dict[str, np.ndarray]:
@@ -174,11 +190,15 @@ def _mat(path: Path) -> dict[str, np.ndarray]:
     except NotImplementedError:
         raise BenchmarkError(f"{path} is of MATLAB's version 7.3; save it with -v7") from None
     except Exception as error:  # whatever the reader says of a file that is none
-        raise BenchmarkError(f"{path} cannot be read as a .mat file: {error}") from None
-    try:
-        return {name: np.asarray(content[name], dtype=float) for name in _NAMES if name in content}
-    except (TypeError, ValueError) as error:
-        raise BenchmarkError(f"{path} has a variable that is no matrix of numbers: {error}") from None
+        raise BenchmarkError(f"{path} cannot be read as a .mat file of version 7 or older") from error
+    found = {}
+    for name in (name for name in _NAMES if name in content):
+        value = content[name].toarray() if hasattr(content[name], "toarray") else content[name]
+        try:
+            found[name] = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise BenchmarkError(f"{path}: {name} is no matrix of real numbers; save it as one") from None
+    return found
 
 
 def _shaped(path: Path, name: str, array: np.ndarray, rows: int, columns: int) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
+import re
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -17,6 +17,11 @@ from casadi_gnc.allocation.allocator import Accuracy
 from casadi_gnc.allocation.modes import along_direction, with_minimum_impulse
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.problem_files.allocation_file import AllocationCase
+from casadi_gnc.system import csv_file
+
+#: A column of commands.
+_COMMAND = re.compile(r"[uU] *[0-9]+")
+_SHOWN = 80
 
 
 class CaseAllocator:
@@ -50,38 +55,38 @@ class CaseAllocator:
 
 
 def read_commands(path: Path, rows: int) -> np.ndarray:
-    """Return the commands of a CSV file with the columns u1 ... uR, (K, R).
+    """Return the commands of a CSV file with the columns u1 ... uR, (K, R); columns of other names may stand beside.
 
     Raises
     ------
     ProblemError
-        For a file that cannot be read, a missing column, or an entry that is no number, by row and
-        column. Entries like nan are numbers here; their answers say BAD_COMMAND.
+        For a file that cannot be read, a column that is missing, named twice or of a larger problem, a row of another
+        length than the line of names, or an entry that is no number, by line and column. Entries like nan are numbers
+        here; their answers say BAD_COMMAND.
     """
     names = [f"u{i}" for i in range(1, rows + 1)]
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.DictReader(file)
-            lacking = [name for name in names if name not in (reader.fieldnames or [])]
-            if lacking:
-                found = ", ".join(reader.fieldnames or []) or "nothing"
-                raise ProblemError(
-                    f"column {lacking[0]} is missing in the first line; expected {', '.join(names)}, found {found}",
-                    path.name,
-                )
-            commands = [[_number(row[name], path, reader.line_num, name) for name in names] for row in reader]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise ProblemError(f"cannot be read as CSV: {error}", str(path)) from error
-    if not commands:
-        raise ProblemError("has a header and no rows of commands", path.name)
-    return np.array(commands)
+    table = csv_file.read_table(path)
+    place = f"{path.name}, line {table.line}"
+    lacking = [name for name in names if name not in table.names]
+    if lacking:
+        found = _cut(", ".join(table.names))
+        raise ProblemError(
+            f"column {lacking[0]} is missing in the line of names; expected {_listed(names)}, found {found}", place
+        )
+    further = [name for name in table.names if _COMMAND.fullmatch(name) and name not in names]
+    if further:
+        raise ProblemError(f"there is a column {_cut(further[0])}, and the problem takes {_listed(names)}", place)
+    if not table.rows:
+        raise ProblemError("has a line of names and no rows of commands", path.name)
+    return np.array(table.column_numbers(names))
 
 
-def _number(text: str | None, path: Path, line: int, name: str) -> float:
-    try:
-        return float(text or "")
-    except ValueError:
-        raise ProblemError(f"{text!r} is no number", f"{path.name}, line {line}, column {name}") from None
+def _listed(names: list[str]) -> str:
+    return ", ".join(names) if len(names) <= 6 else f"{names[0]} to {names[-1]}"
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
 def parse_line(text: str, rows: int) -> np.ndarray:
@@ -89,10 +94,7 @@ def parse_line(text: str, rows: int) -> np.ndarray:
     parts = text.replace(",", " ").split()
     if len(parts) != rows:
         raise ValueError(f"expected {rows} numbers, got {len(parts)}")
-    try:
-        return np.array([float(part) for part in parts])
-    except ValueError as error:
-        raise ValueError(str(error)) from None
+    return np.array([csv_file.number(part) for part in parts])
 
 
 def header(count: int, rows: int) -> list[str]:

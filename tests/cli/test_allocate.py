@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -11,6 +12,8 @@ import time
 import numpy as np
 import pytest
 
+from casadi_gnc.errors import ProblemError
+from casadi_gnc.problem_files.allocating import read_commands
 from casadi_gnc.problem_files.allocation_file import load_allocation
 
 PROGRAM = [sys.executable, "-m", "casadi_gnc.cli.main", "allocate"]
@@ -88,7 +91,7 @@ def test_malformed_lines_are_told_and_the_stream_goes_on():
     assert [answer.get("status", "error") for answer in answers] == [
         "OPTIMAL", "error", "error", "BAD_COMMAND", "BAD_COMMAND", "OPTIMAL",
     ]  # fmt: skip
-    assert answers[1]["error"].startswith("line 2: could not convert")
+    assert answers[1]["error"] == "line 2: 'abc' is no number"
     assert answers[2]["error"] == "line 3: expected 3 numbers, got 2"
     assert all(np.all(np.isfinite(answer["forces"])) for answer in answers if "forces" in answer)
     assert json.loads(done.stderr)["malformed"] == 2
@@ -141,13 +144,13 @@ def test_bad_input_is_told(commands, tmp_path):
     bad.write_text("u1,u3\n1,2\n")
     told(
         run(CASE, "--commands", str(bad)),
-        "bad.csv: column u2 is missing in the first line; expected u1, u2, u3, found u1, u3",
+        "bad.csv, line 1: column u2 is missing in the line of names; expected u1, u2, u3, found u1, u3",
     )
     bad.write_text("u1,u2,u3\n1,2,3\n1,x,3\n")
     told(run(CASE, "--commands", str(bad)), "bad.csv, line 3, column u2: 'x' is no number")
     bad.write_text("u1,u2,u3\n")
-    told(run(CASE, "--commands", str(bad)), "has a header and no rows")
-    told(run(CASE, "--commands", "nowhere.csv"), "cannot be read as CSV")
+    told(run(CASE, "--commands", str(bad)), "has a line of names and no rows of commands")
+    told(run(CASE, "--commands", "nowhere.csv"), "nowhere.csv: cannot be read: No such file")
     told(run(CASE, "--commands", str(path), "--backend", "magic"), "no allocation back end 'magic'; there is online")
     told(run(CASE, "--commands", str(path), "--backend", "daqp"), "without uncertainty only")
     told(run(CASE), "give either --commands FILE or --stream")
@@ -210,6 +213,29 @@ def test_bytes_that_are_no_text_do_not_end_the_stream():
     lines = done.stdout.decode().splitlines()
     assert done.returncode == 0, done.stderr
     assert [line.startswith("error") for line in lines] == [False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("u1,u2,u3\n0,001,0,002,0,003\n", "u.csv, line 2: 6 entries, expected 3"),
+        ("u1,u2,u3\n0,1\n", "u.csv, line 2: 2 entries, expected 3"),
+        ("u1,u2,u3,u1\n1e-4,2e-4,-3e-4,9\n", "u.csv, line 1: the column 'u1' is named twice"),
+        ("u1,u2,u3,u4\n0,0,0,0\n", "u.csv, line 1: there is a column u4, and the problem takes u1, u2, u3"),
+        ('u1,u2,u3\n"0,001","0,002","0,003"\n', "u.csv, line 2, column u1: '0,001' is no number"),
+        ("u1;u2;u3\n0;0;0\n", "column u1 is missing in the line of names; expected u1, u2, u3, found u1;u2;u3"),
+    ],
+)
+def test_no_entry_is_taken_for_another(tmp_path, table, message):
+    (tmp_path / "u.csv").write_text(table)
+    with pytest.raises(ProblemError, match=re.escape(message)):
+        read_commands(tmp_path / "u.csv", 3)
+
+
+def test_blanks_and_further_columns_change_no_command(tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text("t, u2, u1 , note,u3\n0, 2e-4,1e-4, -, -3e-4\n")
+    assert read_commands(path, 3).tolist() == [[1e-4, 2e-4, -3e-4]]
 
 
 def test_table_with_byte_order_mark_and_blank_lines(tmp_path):
