@@ -75,6 +75,10 @@ class FlightError(GncError):
     """Report a flight that cannot be flown as asked."""
 
 
+class CampaignError(GncError):
+    """Report a plan, a dispersion or a statistic of a campaign that cannot be had as asked."""
+
+
 class SynthesisError(GncError):
     """Report matrix inequalities that cannot be posed, or a gain asked for that is not certified."""
 

@@ -23,8 +23,10 @@ _MULTIPLIERS = (0xD2511F53, 0xCD9E8D57)
 _WEYL = (0x9E3779B9, 0xBB67AE85)
 
 
-def philox(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:
+def philox(counter: tuple[Any, Any, Any, Any], key: tuple[int, int]) -> tuple[Any, Any, Any, Any]:
     """Return four random words of 32 bits for a counter of four words and a key of two.
+
+    Words of the counter are integers or arrays of uint64, as many results as they have elements.
 
     Examples
     --------

@@ -28,6 +28,7 @@ FLOORS = {
     "embedded": 4,
     "tables": 4,
     "missions": 5,
+    "campaigns": 6,
     "checking": 6,
     "vehicles": 7,
     "problem_files": 8,

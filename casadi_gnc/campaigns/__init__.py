@@ -1,0 +1,1 @@
+"""Campaigns: many dispersed flights, and what follows from them."""
