@@ -11,7 +11,7 @@ from pydantic import Field, field_validator, model_validator
 from casadi_gnc.campaigns.distributions import Choice, Correlated, Distribution, LogUniform, Normal, Uniform
 from casadi_gnc.campaigns.orientations import Direction, Form, Rotation
 from casadi_gnc.errors import CampaignError, GncError
-from casadi_gnc.system.columns import read_columns
+from casadi_gnc.system.csv_file import read_table
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -37,12 +37,16 @@ class ChoiceTable(Part):
     @model_validator(mode="after")
     def _fit(self) -> ChoiceTable:
         if self.weights and len(self.weights) != len(self.values):
-            raise MisfitError(f"{len(self.weights)} weights for {len(self.values)} values; expected one each", "weights")
+            raise MisfitError(
+                f"{len(self.weights)} weights for {len(self.values)} values; expected one each", "weights"
+            )
         if self.weights and sum(self.weights) <= 0:
             raise MisfitError("all weights are zero; expected one above", "weights")
         lengths = {len(row) for row in self.rows()}
         if len(lengths) > 1:
-            raise MisfitError(f"rows of {' and '.join(map(str, sorted(lengths)))} numbers; expected one length", "values")
+            raise MisfitError(
+                f"rows of {' and '.join(map(str, sorted(lengths)))} numbers; expected one length", "values"
+            )
         return self
 
     def rows(self) -> list[list[float]]:
@@ -124,9 +128,23 @@ class RowsTable(Part):
     def rows(self, folder: Path) -> Choice:
         """Return the distribution; raise `MisfitError` where the file does not give it."""
         try:
-            return Choice(tuple(map(tuple, read_columns(folder / self.file, self.columns).tolist())))
+            table = read_table(folder / self.file)
+            lacking = [name for name in self.columns if name not in table.names]
+            if lacking:
+                raise MisfitError(
+                    f"{self.file} has no column {lacking[0]!r}; it has {', '.join(table.names)}", "columns"
+                )
+            rows = table.column_numbers(self.columns or table.names)
         except GncError as error:
             raise MisfitError(str(error), "file") from None
+        if not rows:
+            raise MisfitError(f"{self.file} has a line of names and no rows", "file")
+        for (line, _), row in zip(table.rows, rows, strict=True):
+            if not all(map(math.isfinite, row)):
+                raise MisfitError(
+                    f"{self.file}, line {line}: a number is not finite; expected what can be flown", "file"
+                )
+        return Choice(tuple(map(tuple, rows)))
 
 
 class DispersionTable(Part):
@@ -164,7 +182,7 @@ class DispersionTable(Part):
         if not given:
             raise MisfitError(f"has no distribution; expected one of {', '.join(_KINDS)}")
         if len(given) > 1:
-            raise MisfitError(f"{' and '.join(given)} are both given; keep one distribution a key", given[1])
+            raise MisfitError(f"has several distributions, {' and '.join(given)}; keep one", given[1])
         return self
 
     def distribution(self, size: int, folder: Path, nominal: list[float] | None = None) -> Distribution:
@@ -191,9 +209,9 @@ class DispersionTable(Part):
         if self.normal is not None:
             return Normal(self.normal.mean, self.normal.deviation, self.normal.truncate, size)
         if self.uniform is not None:
-            return Uniform(*self.uniform, size)
+            return Uniform(self.uniform[0], self.uniform[1], size)
         if self.log_uniform is not None:
-            return LogUniform(*self.log_uniform, size)
+            return LogUniform(self.log_uniform[0], self.log_uniform[1], size)
         if self.choice is not None:
             rows = self.choice.rows()
             return Choice(tuple(map(tuple, rows)), tuple(self.choice.weights), size if len(rows[0]) == 1 else 1)

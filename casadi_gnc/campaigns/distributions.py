@@ -181,7 +181,9 @@ class Correlated(Distribution):
         size = len(self.mean)
         if len(self.covariance) != size or any(len(row) != size for row in self.covariance):
             lengths = [len(row) for row in self.covariance]
-            raise CampaignError(f"the mean has {size} numbers, rows of the covariance {lengths}; expected {size} of {size}")
+            raise CampaignError(
+                f"the mean has {size} numbers, rows of the covariance {lengths}; expected {size} of {size}"
+            )
         check_covariance(self.covariance)
 
     @property
@@ -208,7 +210,7 @@ class Correlated(Distribution):
 def normals(points: np.ndarray, truncate: float | None) -> np.ndarray:
     """Return standard normal numbers at points of (0, 1), within so many deviations if `truncate` is given."""
     if truncate is None:
-        if points.size and not (0.0 < points.min() and points.max() < 1.0):
+        if points.size and not (points.min() > 0.0 and points.max() < 1.0):
             raise CampaignError(
                 "a normal number has no ends at the probabilities 0 and 1; give it `truncate`, or the plan other ends"
             )
@@ -217,7 +219,8 @@ def normals(points: np.ndarray, truncate: float | None) -> np.ndarray:
     # From the nearer end, where small probabilities keep their digits.
     upper = points > 0.5
     share = outside + np.where(upper, 1.0 - points, points) * (1.0 - 2.0 * outside)
-    size = np.minimum(-normal.quantile(share), truncate)
+    ends = (points == 0.0) | (points == 1.0)
+    size = np.where(ends, truncate, np.minimum(-normal.quantile(share), truncate))
     return np.where(upper, size, -size)
 
 
@@ -227,7 +230,9 @@ def check_covariance(covariance: tuple[tuple[float, ...], ...]) -> None:
     largest = float(np.abs(matrix).max())
     skew = float(np.abs(matrix - matrix.T).max())
     if skew > 1e-9 * largest:
-        raise CampaignError(f"the covariance is not symmetric: entries differ from their mirror images by up to {skew:.3g}")
+        raise CampaignError(
+            f"the covariance is not symmetric: entries differ from their mirror images by up to {skew:.3g}"
+        )
     smallest = float(np.linalg.eigvalsh(matrix)[0])
     if smallest < -1e-9 * largest:
         raise CampaignError(

@@ -33,17 +33,19 @@ class Plan(ABC):
         CampaignError
             For a seed beyond 64 bits, or a range that the plan does not have.
         """
+        self._check(seed, first, last)
+        return self._points(seed, first, last) if first < last else np.empty((0, self.dimensions))
+
+    def weights(self, seed: int, first: int, last: int) -> np.ndarray:
+        """Return how much each case counts, (last - first,): 1 unless the plan prefers some region."""
+        self._check(seed, first, last)
+        return np.ones(last - first)
+
+    def _check(self, seed: int, first: int, last: int) -> None:
         check_seed(seed)
         most = MOST_CASES if self.cases is None else self.cases
         if not 0 <= first <= last <= most:
             raise CampaignError(f"cases {first} to {last - 1} are asked for; the plan has cases 0 to {most - 1}")
-        if first == last:
-            return np.empty((0, self.dimensions))
-        return self._points(seed, first, last)
-
-    def weights(self, seed: int, first: int, last: int) -> np.ndarray:
-        """Return how much each case counts, (last - first,): 1 unless the plan prefers some region."""
-        return np.ones(len(self.points(seed, first, last)))
 
     @abstractmethod
     def _points(self, seed: int, first: int, last: int) -> np.ndarray:
