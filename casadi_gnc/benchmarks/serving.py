@@ -7,7 +7,6 @@ COUNTER is the inherited descriptor of the file of `workers.BEAT`; LOG takes wha
 
 from __future__ import annotations
 
-import ctypes
 import mmap
 import os
 import pickle
@@ -17,17 +16,14 @@ import sys
 from casadi_gnc.benchmarks.measuring import measure
 from casadi_gnc.benchmarks.workers import BEAT, Outcome, answer
 from casadi_gnc.errors import GncError
-
-_PR_SET_PDEATHSIG = 1
+from casadi_gnc.system.processes import leave_with_parent
 
 
 def main() -> None:
     """Serve until the asking end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)  # a solver that hangs must not outlive its run
-        if os.getppid() != int(os.environ.get("CASADI_GNC_PARENT", os.getppid())):
-            return
+    # A solver that hangs must not outlive its run.
+    leave_with_parent(int(os.environ.get("CASADI_GNC_PARENT", os.getppid())))
     jobs, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     beat = mmap.mmap(int(sys.argv[1]), BEAT.size)
     log = os.open(sys.argv[2], os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)

@@ -5,8 +5,6 @@ Counts are exact and the same on every host, so they stand beside the times and 
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Any
 
 from casadi_gnc.benchmarks.contest import Family
@@ -14,6 +12,7 @@ from casadi_gnc.delivery import packaging
 from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import targets
 from casadi_gnc.errors import GncError
+from casadi_gnc.system.folders import workshop
 
 #: Samples replayed; the fewest that a package takes are some more than those with bad measurements.
 STEPS = packaging.SPOILED + 40
@@ -41,8 +40,8 @@ def table(families: list[Family]) -> str:
 
 def _counts(family: Family, real: str, boards: list[known_boards.Target]) -> list[dict[str, Any]]:
     found = []
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as workshop:
-        folder, given = Path(workshop) / "package", family.data
+    with workshop() as shop:
+        folder, given = shop / "package", family.data
         try:
             packaging.generate(given.problem, folder, scheme=given.scheme, name="step", real=real, steps=STEPS)
         except GncError as error:

@@ -1,16 +1,14 @@
 """Make a package of a controller: a folder that an embedded project takes as it is.
 
 A folder that was made before is replaced only if nobody changed a file of it since: `manifest.json`
-holds the hash of each. Everything is written beside the folder and renamed, so nothing is half done.
+holds the hash of each. Everything is written beside the folder and put in its place at one moment, so nothing is half
+done and nobody else's file is ever anywhere but where it was.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-import shutil
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -21,7 +19,8 @@ from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.source import allocator_files, render_header, render_source, runtime_files
 from casadi_gnc.errors import OutputError, PackageError
-from casadi_gnc.system import assets
+from casadi_gnc.system import assets, temporary
+from casadi_gnc.system.exchange import replace_folder
 from casadi_gnc.system.templates import template
 
 #: Where a package's own Makefile and CMake build; never looked at.
@@ -146,17 +145,19 @@ def write(folder: Path, build: Callable[[Path], dict[str, str]], *, force: bool 
         Where the folder is something else, was edited, or cannot be written; it is left as it was.
     """
     check_room(folder, force)
+    folder = folder.resolve()
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as place:
-            workshop, fresh = Path(place) / "work", Path(place) / "new"
+        with temporary.folder(folder.parent, folder.name) as place:
+            workshop, fresh = place / "work", place / "new"
             workshop.mkdir()
             files = build(workshop)
             put(fresh, files)
-            if folder.exists():
-                _keep_own(folder, fresh, set(read_manifest(folder)["files"]) if any(folder.iterdir()) else set())
-                os.replace(folder, Path(place) / "old")
-            os.replace(fresh, folder)
+            exists = folder.exists() and any(folder.iterdir())
+            ours = set(read_manifest(folder)["files"]) if exists else set()
+            if exists:
+                ours |= {path.relative_to(folder).as_posix() for path in (folder / BUILD).rglob("*")} | {BUILD}
+            replace_folder(fresh, folder, ours, MANIFEST)
     except OSError as error:
         raise OutputError(f"cannot write {folder}: {error.strerror or error}; choose another --out") from error
 
@@ -167,13 +168,3 @@ def put(folder: Path, files: dict[str, str]) -> None:
         target = folder / path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text(text, encoding="utf-8", newline="\n")
-
-
-def _keep_own(folder: Path, fresh: Path, known: set[str]) -> None:
-    """Copy the user's own files of an old package into the new one."""
-    for path in sorted(folder.rglob("*")):
-        inside = path.relative_to(folder)
-        own = inside.as_posix() not in known and inside.as_posix() != MANIFEST and inside.parts[0] != BUILD
-        if path.is_file() and own and not (fresh / inside).exists():
-            (fresh / inside).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy2(path, fresh / inside)

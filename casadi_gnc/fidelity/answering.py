@@ -10,12 +10,13 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
 from dataclasses import dataclass
 from importlib import metadata
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 import casadi_gnc
 from casadi_gnc.errors import GncError
@@ -24,7 +25,7 @@ from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.fidelity.verdict import Answer
 from casadi_gnc.problem_files.document import read
 from casadi_gnc.status import StepStatus
-from casadi_gnc.system import assets, compilers
+from casadi_gnc.system import assets, compilers, processes
 from casadi_gnc.system.files import write_beside
 
 Progress = Callable[[int, int], None]
@@ -46,6 +47,14 @@ class Question:
     def key(self, surroundings: str) -> str:
         """Return the hash of the question and of all that could change its answer."""
         return hashlib.sha256(f"{self.kind}\n{self.content}\n{surroundings}".encode()).hexdigest()
+
+
+class _Kept(BaseModel):
+    """What a file of the cache holds: numbers by name, None where a flight gives none."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    values: dict[str, float | None]
 
 
 def _surroundings() -> str:
@@ -108,29 +117,38 @@ def answer(
     """
     asked = _questions(file.claim)
     numbers: dict[str, dict[str, Any]] = {claim.id: {"ours": None} for claim in file.claim}
-    for done, (question, found) in enumerate(_answered(list(asked), processes, fresh), 1):
+    for done, (question, found) in enumerate(_answered(asked, processes, fresh), 1):
         for claim, role in asked[question]:
             if "failure" in found:
                 numbers[claim]["failure"] = found["failure"]
             else:
-                numbers[claim][role] = found["values"][claim if question.kind == "flight" else "value"]
+                numbers[claim][role] = found["values"][_name(question, claim)]
         if progress:
             progress(done, len(asked))
     return [Answer(claim, **numbers[claim.id]) for claim in file.claim]
 
 
-def _answered(questions: list[Question], processes: int, fresh: bool) -> Iterator[tuple[Question, dict[str, Any]]]:
+def _name(question: Question, claim: str) -> str:
+    """Return the name in a question's answer of the number for a claim."""
+    return claim if question.kind == "flight" else "value"
+
+
+def _answered(
+    asked: dict[Question, list[tuple[str, str]]], count: int, fresh: bool
+) -> Iterator[tuple[Question, dict[str, Any]]]:
     """Yield questions with their answers as they come, those in the cache first."""
     folder, surroundings, missing = compilers.cache_folder() / "claims", _surroundings(), []
-    for question in questions:
+    for question, askers in asked.items():
         known = None if fresh else _remembered(folder / f"{question.key(surroundings)}.json")
+        if known is not None and not {_name(question, claim) for claim, _ in askers} <= set(known["values"]):
+            known = None
         if known is None:
             missing.append(question)
         else:
             yield question, known
     if not missing:
         return
-    with ProcessPoolExecutor(min(processes, len(missing)), mp_context=get_context("spawn")) as pool:
+    with processes.pool(min(count, len(missing))) as pool:
         running: dict[Future, Question] = {pool.submit(find, question): question for question in missing}
         for future in as_completed(running):
             question, found = running[future], _result(future)
@@ -150,9 +168,10 @@ def _result(future: Future) -> dict[str, Any]:
 
 
 def _remembered(path: Path) -> dict[str, Any] | None:
+    """Return an answer that was kept, or None: of what is not as we write it nothing is taken."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError):
+        return _Kept.model_validate_json(path.read_bytes()).model_dump()
+    except (OSError, ValidationError):
         return None
 
 

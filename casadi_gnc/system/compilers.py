@@ -2,13 +2,12 @@
 
 Libraries are cached in the user's cache folder under the hash of everything that went into them:
 source, headers, flags and the compiler's own version. A library is built beside its final name and
-renamed, so an interrupted build leaves no broken entry. Where that folder cannot serve, another does
-(`casadi_gnc.system.folders`).
+renamed, so an interrupted build leaves no broken entry, and its own hash is looked at before it is loaded
+(`casadi_gnc.system.library_cache`). Where that folder cannot serve, another does (`casadi_gnc.system.folders`).
 """
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import hashlib
 import os
@@ -17,14 +16,13 @@ import shlex
 import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from casadi_gnc.errors import CompilerError, NoCompilerError
-from casadi_gnc.system import folders
+from casadi_gnc.system import folders, library_cache, temporary
 from casadi_gnc.system.folders import CACHE_VARIABLE, cache_folder, workshop
 
 __all__ = [
@@ -163,22 +161,24 @@ def compiled(
     for part in (source, *texts, *FLAGS, *flags, *compiler.command, compiler.version, *machine):
         key.update(part.encode())
         key.update(b"\0")
-    name = f"{key.hexdigest()[:32]}{'.dll' if os.name == 'nt' else '.so'}"
-    troubles = []
+    name, troubles = key.hexdigest()[:32], dict[Path, str]()
     for find_folder in (cache_folder, folders.private_folder):
         folder = find_folder()
-        if (folder / name).exists() and not folders.forbids_running(folder):
-            return folder / name
+        if folder in troubles:
+            continue
+        if not folders.forbids_running(folder) and (known := library_cache.find(folder, name)) is not None:
+            return known
         found = folders.trouble(folder)
         if found is None:
             try:
-                return _built(folder / name, source, units, compiler, (*FLAGS, *flags, f"-I{include}"), include)
+                return _built(folder, name, source, units, compiler, (*FLAGS, *flags, f"-I{include}"), include)
             except _NoRoomError:  # the other folder may be on another disk
                 found = "has no space left"
             except OSError as error:
                 found = f"cannot be written ({folders.reason(error)})"
-        troubles.append(f"{folder} {found}")
-    raise CompilerError(f"compiled libraries have no folder: {'; '.join(troubles)}; {folders.remedy(None)}")
+        troubles[folder] = found
+    told = "; ".join(f"{folder} {found}" for folder, found in troubles.items())
+    raise CompilerError(f"compiled libraries have no folder: {told}; {folders.remedy(None)}")
 
 
 class _NoRoomError(CompilerError):
@@ -186,18 +186,21 @@ class _NoRoomError(CompilerError):
 
 
 def _built(
-    library: Path, source: str, units: tuple[str, ...], compiler: Compiler, flags: tuple[str, ...], include: Path
+    folder: Path,
+    name: str,
+    source: str,
+    units: tuple[str, ...],
+    compiler: Compiler,
+    flags: tuple[str, ...],
+    include: Path,
 ) -> Path:
     """Build a library beside its place, and put it there."""
-    with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-", ignore_cleanup_errors=True) as shop:
-        unit, product = Path(shop) / "unit.c", Path(shop) / library.name
+    with temporary.folder(folder) as shop:
+        unit, product = shop / "unit.c", shop / f"product{library_cache.ENDING}"
         unit.write_text(source, encoding="utf-8")
         sources = [str(unit), *(str(include / name) for name in units)]
-        compile_in(Path(shop), compiler, [*flags, "-o", str(product), *sources, "-lm"], "the generated source")
-        with product.open("rb") as file:
-            os.fsync(file.fileno())
-        os.replace(product, library)
-    return library
+        compile_in(shop, compiler, [*flags, "-o", str(product), *sources, "-lm"], "the generated source")
+        return library_cache.keep(folder, name, product)
 
 
 def compile_in(shop: Path, compiler: Compiler, words: list[str], what: str) -> None:
@@ -234,14 +237,13 @@ def compile_in(shop: Path, compiler: Compiler, words: list[str], what: str) -> N
 def load(source: str, **options: Any) -> ctypes.CDLL:
     """Return a built library, loaded; arguments as for `compiled`.
 
-    A cached file that cannot be loaded (cut short by a full disk, say) is built once more.
+    A library that cannot be loaded here (another machine with the same cache built it, say) is built once more.
     """
     path = compiled(source, **options)
     try:
         return ctypes.CDLL(str(path))
     except OSError:
-        with contextlib.suppress(OSError):
-            path.unlink(missing_ok=True)
+        library_cache.forget(path)
     return open_library(compiled(source, **options))
 
 

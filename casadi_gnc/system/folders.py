@@ -2,24 +2,28 @@
 
 A container may have no home and a user without a name, a home that is read-only or full, or a folder from which nothing
 may be run (`noexec`). Whatever is left is used; where nothing is, one sentence names each folder, its trouble, and the
-variable that chooses another.
+variable that chooses another. What others may write is not run: a cache that is not the user's own is left alone.
 """
 
 from __future__ import annotations
 
 import atexit
 import errno
+import logging
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import lru_cache
 from pathlib import Path
 
 import platformdirs
 
 from casadi_gnc.errors import CompilerError
+from casadi_gnc.system import temporary
 
+LOG = logging.getLogger("casadi_gnc")
 #: Overrides the cache folder.
 CACHE_VARIABLE = "CASADI_GNC_CACHE"
 #: Bytes that must be free.
@@ -30,32 +34,72 @@ _NO_ROOM = ("No space left on device", "Disk quota exceeded", "File too large")
 def cache_folder() -> Path:
     """Return the folder of compiled libraries; it may not exist yet.
 
-    Without a home it is a private temporary one that lasts as long as the process: what others can write is not run.
+    Of a folder that everybody shares as /tmp is shared it is a private one inside. Without a home, and where the
+    folder belongs to somebody else or can be written by others (which is told), it is a private temporary one that
+    lasts as long as the process: what others can write is not run.
     """
     chosen = os.environ.get(CACHE_VARIABLE, "").strip()
-    if chosen:
-        return Path(chosen).resolve()
     try:
-        return Path(platformdirs.user_cache_dir("casadi-gnc")).absolute()
+        folder = Path(chosen).resolve() if chosen else Path(platformdirs.user_cache_dir("casadi-gnc")).absolute()
     except (RuntimeError, OSError):  # no home, and a user whom the system does not know
         return private_folder()
+    if _is_shared(folder):
+        folder /= f"casadi-gnc-{os.geteuid()}"
+    whose = not_ours(folder)
+    if whose is None:
+        return folder
+    _tell(
+        f"the cache {folder} {whose}: nothing in it is used, and libraries are built in a private folder each time; "
+        f"set {CACHE_VARIABLE} to a folder that only you can write (chmod 700)"
+    )
+    return private_folder()
+
+
+def _is_shared(folder: Path) -> bool:
+    """Tell whether all may write in a folder, but each only touch what is their own (the sticky bit)."""
+    try:
+        return os.name != "nt" and folder.stat().st_mode & 0o1002 == 0o1002
+    except OSError:
+        return False
+
+
+@lru_cache
+def _tell(sentence: str) -> None:
+    """Say a sentence once."""
+    LOG.warning("%s", sentence)
+
+
+def not_ours(path: Path) -> str | None:
+    """Return why what a file or folder holds must not be run; None if only this user, or root, can have written it."""
+    if os.name == "nt":
+        return None
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    if found.st_uid not in (os.geteuid(), 0):
+        return "belongs to another user"
+    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"can be written by others (its mode is {stat.S_IMODE(found.st_mode):o})"
+    return None
 
 
 @lru_cache
 def private_folder() -> Path:
     """Return a temporary folder that lasts as long as the process; raise `CompilerError` if none can be made."""
+    held = ExitStack()
     try:
-        folder = tempfile.TemporaryDirectory(prefix="casadi-gnc-", ignore_cleanup_errors=True)
+        folder = held.enter_context(temporary.folder(Path(tempfile.gettempdir())))
     except OSError as error:
         raise CompilerError(f"no temporary folder can be written ({reason(error)}); {remedy(None)}") from None
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
+    atexit.register(held.close)
+    return folder
 
 
 def trouble(folder: Path) -> str | None:
     """Return why nothing can be built in a folder, which is made if need be; None if nothing is wrong."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as probe:
             probe.write(b"\0" * 4096)
             probe.flush()
@@ -95,21 +139,21 @@ def workshop() -> Iterator[Path]:
     CompilerError
         If there is none.
     """
-    troubles, made = [], None
-    for parent in (None, cache_folder()):
-        try:
-            place = Path(tempfile.gettempdir()) if parent is None else parent
-            found = trouble(place)
-            if found is None:
-                made = tempfile.TemporaryDirectory(dir=place, prefix="casadi-gnc-", ignore_cleanup_errors=True)
-                break
-            troubles.append(f"{place} {found}")
-        except OSError as error:
-            troubles.append(f"no temporary folder can be written ({reason(error)})")
-    if made is None:
-        raise CompilerError(f"there is no folder to build in: {'; '.join(dict.fromkeys(troubles))}; {remedy(None)}")
-    with made as name:
-        yield Path(name)
+    troubles, held = [], ExitStack()
+    with held:
+        for parent in (None, cache_folder()):
+            try:
+                place = Path(tempfile.gettempdir()) if parent is None else parent
+                found = trouble(place)
+                if found is None:
+                    made = held.enter_context(temporary.folder(place))
+                    break
+                troubles.append(f"{place} {found}")
+            except OSError as error:
+                troubles.append(f"no temporary folder can be written ({reason(error)})")
+        else:
+            raise CompilerError(f"there is no folder to build in: {'; '.join(dict.fromkeys(troubles))}; {remedy(None)}")
+        yield made
 
 
 def reason(error: OSError) -> str:

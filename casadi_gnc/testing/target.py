@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import tempfile
-from pathlib import Path
 from typing import Any
 
 from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.delivery.verifying import verify
 from casadi_gnc.embedded import boards
+from casadi_gnc.system.folders import workshop
 from casadi_gnc.testing.asserting import must
 
 
@@ -24,8 +23,8 @@ def check_target(target: Any, problem: Any = "huang2020/detumble", steps: int = 
     """
     board = boards.find(target)
     board.need()
-    with tempfile.TemporaryDirectory(prefix="casadi-gnc-") as place:
-        folder = Path(place) / "package"
+    with workshop() as shop:
+        folder = shop / "package"
         generate(problem, folder, scheme=None, name="contract", steps=steps)
         found = verify(folder, (board,))
     must(found["words"] == 0, f"{board.name}: {found['words']} words differ from those of the host")

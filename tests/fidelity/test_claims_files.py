@@ -139,6 +139,42 @@ metric = {{ kind = "peak", signal = "velocity_error" }}
 
 
 @pytest.mark.parametrize(
+    "kept",
+    [
+        b"", b"half", b"\xff\xfe", b"[]", b"{}", b'{"values": {"value": "5"}}', b'{"values": {"value": true}}',
+        b'{"values": {"value": 5.0}, "failure": "x"}',
+    ],
+)  # fmt: skip
+def test_an_answer_of_another_form_is_none(kept, tmp_path):
+    from casadi_gnc.fidelity import answering
+
+    (tmp_path / "a.json").write_bytes(kept)
+    assert answering._remembered(tmp_path / "a.json") is None
+
+
+@pytest.mark.parametrize("kept", [b"\xff\xfe", b'{"values": {"other": 5.0}}'])
+def test_an_answer_that_is_not_as_it_was_kept_is_found_anew(kept, tmp_path, monkeypatch):
+    monkeypatch.setenv("CASADI_GNC_CACHE", str(tmp_path))
+    file = fidelity.read_claims(written(tmp_path))
+    (first,) = fidelity.answer(file, processes=1)
+    (place,) = (tmp_path / "claims").glob("*.json")
+    right = place.read_bytes()
+    place.write_bytes(b'{"values": {"value": 5.0}}')  # what is as we write it is believed
+    assert fidelity.answer(file, processes=1)[0].ours == 5.0
+    place.write_bytes(kept)
+    assert fidelity.answer(file, processes=1)[0].ours == first.ours
+    assert place.read_bytes() == right
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), -0.0, None])
+def test_any_number_is_remembered(number, tmp_path):
+    from casadi_gnc.fidelity import answering
+
+    answering._remember(tmp_path / "a.json", {"values": {"value": number}})
+    assert repr(answering._remembered(tmp_path / "a.json")) == repr({"values": {"value": number}})
+
+
+@pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
         (["nobody2020"], "no paper 'nobody2020'; there is huang20"),
