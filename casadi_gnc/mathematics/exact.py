@@ -7,6 +7,7 @@ symbols become the CasADi operation, which the C evaluates with its own mathemat
 
 from __future__ import annotations
 
+import math
 from decimal import Context, Decimal, localcontext
 from typing import Any
 
@@ -18,6 +19,28 @@ _CONTEXT = Context(prec=50)
 def is_number(value: Any) -> bool:
     """Tell a plain number (also numpy's) from a CasADi expression."""
     return not isinstance(value, (ca.SX, ca.MX))
+
+
+def array(values: Any) -> Any:
+    """Return numbers or symbols, as lists and rows, as CasADi holds them: DM, or SX where one of them is a symbol."""
+    if isinstance(values, (ca.SX, ca.MX, ca.DM)):
+        return values
+    if not isinstance(values, (list, tuple)):
+        return ca.DM(values)
+    rows = [list(row) if isinstance(row, (list, tuple)) else [row] for row in values]
+    if all(is_number(entry) for row in rows for entry in row):
+        return ca.DM(list(values))
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
+
+
+def is_zero(value: Any) -> bool:
+    """Tell whether a value is the number 0; a symbol is not."""
+    return is_number(value) and float(value) == 0.0
+
+
+def sqrt(x: Any) -> Any:
+    """Return the square root, correctly rounded, of a number or a symbol."""
+    return math.sqrt(x) if is_number(x) else ca.sqrt(x)
 
 
 def phi1(x: Any) -> Any:
@@ -38,12 +61,14 @@ def phi1(x: Any) -> Any:
     return ca.if_else(small, 1 + x / 2, ca.expm1(divisor) / divisor)
 
 
-def cos_sin(angle: float) -> tuple[float, float]:
-    """Return cosine and sine of an angle [rad], each correctly rounded.
+def cos_sin(angle: Any) -> tuple[Any, Any]:
+    """Return cosine and sine of an angle [rad], each correctly rounded; of a symbol, the expressions.
 
     The Taylor series is summed after the angle was halved until it is below 0.1, then the
     double-angle formulas undo the halving; 50 digits leave room for the loss on the way.
     """
+    if not is_number(angle):
+        return ca.cos(angle), ca.sin(angle)
     with localcontext(_CONTEXT):
         halved, halvings = Decimal(float(angle)), 0
         while abs(halved) > Decimal("0.1"):

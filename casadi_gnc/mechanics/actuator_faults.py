@@ -19,6 +19,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics.exact import is_number, is_zero
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,8 @@ class ActuatorFault:
     group: str = "actuator"
 
     def __post_init__(self) -> None:
+        if not all(map(is_number, (self.effectiveness, self.bias, self.start, self.end, self.growth))):
+            return  # symbols in the place of numbers, whose ranges whoever put them there looks after
         if not 0 <= self.effectiveness <= 1:
             raise FlightError(f"{self}: effectiveness is {self.effectiveness:g}, expected 0 (dead) to 1 (sound)")
         if not math.isfinite(self.bias):
@@ -71,12 +74,24 @@ class ActuatorFault:
     def profile(self, t: Any) -> Any:
         """Return b(t): 0 before the fault, towards 1 while it grows, 0 after its end (eq. 21)."""
         grown = -ca.expm1(-self.growth * ca.if_else(t > self.start, t - self.start, 0.0))
-        return grown if self.end == math.inf else ca.if_else(t < self.end, grown, 0.0)
+        return grown if is_number(self.end) and self.end == math.inf else ca.if_else(t < self.end, grown, 0.0)
+
+    @property
+    def weakens(self) -> bool:
+        """Whether less is made of a command than it asks."""
+        return not (is_number(self.effectiveness) and self.effectiveness == 1)
+
+    @property
+    def biases(self) -> bool:
+        """Whether something is added."""
+        return not is_zero(self.bias)
 
     def clashes(self, other: ActuatorFault) -> bool:
         """Tell whether both change the same quantity of the same actuator at the same time."""
-        same = (self.effectiveness < 1 and other.effectiveness < 1) or (self.bias != 0 and other.bias != 0)
-        return self.actuator == other.actuator and same and self.start < other.end and other.start < self.end
+        if self.actuator != other.actuator or not all(map(is_number, (self.start, self.end, other.start, other.end))):
+            return False
+        same = (self.weakens and other.weakens) or (self.biases and other.biases)
+        return same and self.start < other.end and other.start < self.end
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +134,7 @@ class FaultSchedule:
         rows = [command[i] for i in range(self.count)]
         for i in range(self.count):
             own = [fault for fault in self.faults if fault.actuator == i + 1]
-            lost = sum((1 - fault.effectiveness) * fault.profile(t) for fault in own if fault.effectiveness < 1)
-            bias = sum(fault.bias * fault.profile(t) for fault in own if fault.bias)
+            lost = sum((1 - fault.effectiveness) * fault.profile(t) for fault in own if fault.weakens)
+            bias = sum(fault.bias * fault.profile(t) for fault in own if fault.biases)
             rows[i] = (1 - lost) * rows[i] + bias
         return ca.vertcat(*rows)

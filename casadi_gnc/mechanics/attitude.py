@@ -25,6 +25,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.mathematics import exact
+from casadi_gnc.mathematics.exact import array
 
 
 def kinematic_matrix(s: Any) -> Any:
@@ -92,13 +93,13 @@ def relative(s: Any, reference: Any) -> Any:
     return compose(s, -reference)
 
 
-def frame_rotation(yaw: float, pitch: float, roll: float) -> ca.DM:
+def frame_rotation(yaw: Any, pitch: Any, roll: Any) -> Any:
     """Return Rx(roll) Ry(pitch) Rz(yaw), 3 x 3, from angles [rad] of a 3-2-1 sequence of frames.
 
     The entries are the same to the last bit on every machine (see `casadi_gnc.mathematics.exact`).
     """
     (cz, sz), (cy, sy), (cx, sx) = (exact.cos_sin(a) for a in (yaw, pitch, roll))
-    about_x = ca.DM([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
-    about_y = ca.DM([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
-    about_z = ca.DM([[cz, sz, 0], [-sz, cz, 0], [0, 0, 1]])
+    about_x = array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+    about_y = array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]])
+    about_z = array([[cz, sz, 0], [-sz, cz, 0], [0, 0, 1]])
     return ca.mtimes([about_x, about_y, about_z])

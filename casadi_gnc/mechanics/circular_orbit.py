@@ -21,12 +21,12 @@ which is the same number.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics import exact
 from casadi_gnc.mechanics import attitude
 
 #: Gravitational parameter of the Earth [m^3/s^2] and its equatorial radius [m] (WGS 84, EGM 96).
@@ -50,7 +50,7 @@ class CircularOrbit:
     @property
     def rate(self) -> float:
         """Return n, [rad/s]."""
-        return math.sqrt(self.mu / (self.radius * self.radius * self.radius))
+        return exact.sqrt(self.mu / (self.radius * self.radius * self.radius))
 
     def radial(self, mrp: Any) -> Any:
         """Return e, (3,), F_s."""

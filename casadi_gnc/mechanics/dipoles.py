@@ -42,6 +42,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.exact import array
 
 #: k = 3 mu_0/(4 pi), [N/A^2], with mu_0 = 4 pi 1e-7.
 STRENGTH = 3e-7
@@ -71,7 +72,7 @@ class TargetDipole:
         """Return mu_T, (3,), [A m^2], for a separation [m]."""
         if self.steered:
             return self.moment * separation / length(separation)
-        return ca.DM(list(self.moment)) if isinstance(self.moment, (tuple, list)) else self.moment
+        return array(self.moment) if isinstance(self.moment, (tuple, list)) else self.moment
 
 
 def force_map(separation: Any, target: Any) -> Any:

@@ -7,6 +7,8 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array, is_zero
+
 
 @dataclass(frozen=True)
 class Harmonics:
@@ -29,10 +31,10 @@ class Harmonics:
 
     def at(self, t: Any) -> Any:
         """Return d(t), (3,), at time t [s]."""
-        total = ca.DM(list(self.constant))
+        total = array(self.constant)
         phases = self.phases or (0.0,) * len(self.frequencies)
         for frequency, amplitude, phase in zip(self.frequencies, self.amplitudes, phases, strict=True):
-            total = total + ca.DM(list(amplitude)) * ca.sin(frequency * t + phase)
+            total = total + array(amplitude) * ca.sin(frequency * t + phase)
         return total
 
 
@@ -54,8 +56,13 @@ class OrbitalDisturbance:
     cosine: tuple[float, ...] = (0.0,) * 6
     deviation: tuple[float, ...] = (0.0,) * 6
 
+    @property
+    def is_random(self) -> bool:
+        """Whether there is a random part."""
+        return not all(is_zero(value) for value in self.deviation)
+
     def effort(self, t: Any, orbit_rate: Any) -> Any:
         """Return d(t) without its random part, (6,)."""
-        phase, columns = orbit_rate * t, (ca.DM(list(part)) for part in (self.constant, self.sine, self.cosine))
+        phase, columns = orbit_rate * t, (array(part) for part in (self.constant, self.sine, self.cosine))
         constant, sine, cosine = columns
         return constant + sine * ca.sin(phase) + cosine * ca.cos(phase)

@@ -40,6 +40,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.rigid_body import RigidBody
 
@@ -79,7 +80,7 @@ class ProximityMotion:
 
     def arm(self, now: SimpleNamespace) -> Any:
         """Return R p_t, (3,), [m]: point P from the target's centre, in the chaser's frame."""
-        return ca.mtimes(attitude.dcm(now.attitude_error), ca.DM(self.hold_point))
+        return ca.mtimes(attitude.dcm(now.attitude_error), array(self.hold_point))
 
     def separation(self, now: SimpleNamespace) -> Any:
         """Return q = r_e + R p_t, (3,), [m]: the chaser from the target's centre."""

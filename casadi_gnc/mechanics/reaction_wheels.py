@@ -33,13 +33,14 @@ import numpy as np
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.signals import Layout, Signal
 
 
 def free_axes(rotation: Any, mounted: Any) -> ca.DM:
     """Return C = R Cbar, (3, N)."""
-    return ca.mtimes(ca.DM(rotation), ca.DM(mounted))
+    return ca.mtimes(array(rotation), array(mounted))
 
 
 def axes_as_points(rotation: Any, mounted: Any, centre_of_mass: Any) -> ca.DM:
@@ -49,8 +50,8 @@ def axes_as_points(rotation: Any, mounted: Any, centre_of_mass: Any) -> ca.DM:
     ----------
     centre_of_mass : r_c, (3,), [m], service frame.
     """
-    axes = ca.DM(mounted)
-    return ca.mtimes(ca.DM(rotation), axes - ca.repmat(ca.DM(centre_of_mass), 1, axes.shape[1]))
+    axes = array(mounted)
+    return ca.mtimes(array(rotation), axes - ca.repmat(array(centre_of_mass), 1, axes.shape[1]))
 
 
 def corner_shifts(rotation: Any, lower: list[float], upper: list[float]) -> np.ndarray:

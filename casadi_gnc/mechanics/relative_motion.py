@@ -25,11 +25,12 @@ Source: Shi, Liu, Biggs, Sun, Yue (2020), eqs (3), (5), doi:10.1016/j.ast.2020.1
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
+
+from casadi_gnc.mathematics import exact
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,13 @@ class EllipticOrbit:
     def mean_rate(self) -> float:
         """Return sqrt(mu/a^3), [rad/s]."""
         a = self.semi_major_axis
-        return math.sqrt(self.mu / (a * a * a))
+        return exact.sqrt(self.mu / (a * a * a))
 
     def rate(self, anomaly: Any) -> Any:
         """Return omega = theta', [rad/s] (eq. 3)."""
         e = self.eccentricity
         near = 1 + e * ca.cos(anomaly)
-        return near * near * (self.mean_rate / ((1 - e * e) * math.sqrt(1 - e * e)))
+        return near * near * (self.mean_rate / ((1 - e * e) * exact.sqrt(1 - e * e)))
 
     def acceleration(self, anomaly: Any, position: Any, velocity: Any) -> Any:
         """Return the relative acceleration without forces, (3,), [m/s^2], orbit frame (eq. 5)."""
@@ -111,8 +112,8 @@ class PairModel:
 
     def ahead(self, position: Any) -> Any:
         """Return the way from a position to the port, (3,), [m]."""
-        return ca.DM(list(self.port)) - position
+        return exact.array(self.port) - position
 
     def holding(self) -> Any:
         """Return the force, (3,), [N], that keeps the first mass at rest at the port."""
-        return -self.mass * self.acceleration(ca.DM(list(self.port)), ca.DM.zeros(3))
+        return -self.mass * self.acceleration(exact.array(self.port), ca.DM.zeros(3))

@@ -7,12 +7,13 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array, is_zero
 from casadi_gnc.mechanics import attitude
 
 
 def inverse3(matrix: Any) -> Any:
     """Invert a 3 x 3 matrix by cofactors: plain arithmetic, so constants fold deterministically."""
-    m: Any = matrix if isinstance(matrix, (ca.SX, ca.MX)) else ca.DM(matrix)
+    m: Any = array(matrix)
     rows = [m[i, :].T for i in range(3)]
     columns = [ca.cross(rows[1], rows[2]), ca.cross(rows[2], rows[0]), ca.cross(rows[0], rows[1])]
     return ca.horzcat(*columns) / ca.dot(rows[0], columns[0])
@@ -43,7 +44,7 @@ class RigidBody:
 
     def momentum(self, rate: Any) -> Any:
         """Return J w, (3,), [N m s], body frame."""
-        return ca.mtimes(ca.DM(self.inertia) if not isinstance(self.inertia, ca.SX) else self.inertia, rate)
+        return ca.mtimes(array(self.inertia), rate)
 
     def gravity_gradient(self, mrp: Any) -> Any:
         """Return u_g = 3 w_0^2 c x J c, (3,), [N m], with c the local vertical (eq. 15)."""
@@ -52,8 +53,8 @@ class RigidBody:
 
     def acceleration(self, mrp: Any, rate: Any, torque: Any = None) -> Any:
         """Return w', (3,), [rad/s^2], under an applied `torque` [N m] (none by default)."""
-        total = ca.DM(list(self.constant_torque)) - ca.cross(rate, self.momentum(rate))
-        if self.orbit_rate:
+        total = array(self.constant_torque) - ca.cross(rate, self.momentum(rate))
+        if not is_zero(self.orbit_rate):
             total = total + self.gravity_gradient(mrp)
         if torque is not None:
             total = total + torque

@@ -21,6 +21,8 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.mathematics.exact import array
+
 
 @dataclass(frozen=True, eq=False)
 class ThrusterGeometry:
@@ -38,7 +40,7 @@ class ThrusterGeometry:
     @classmethod
     def from_rows(cls, positions: list[list[float]], directions: list[list[float]]) -> ThrusterGeometry:
         """Build from N rows of three numbers, as a problem file lists them."""
-        return cls(ca.DM(positions).T, ca.DM(directions).T)
+        return cls(array(positions).T, array(directions).T)
 
     @property
     def count(self) -> int:
@@ -47,7 +49,7 @@ class ThrusterGeometry:
 
     def seen_from(self, rotation: ca.DM, centre_of_mass: list[float]) -> ThrusterGeometry:
         """Return d = R (d_s - r_c) and e = R e_s (eqs 8-9)."""
-        shift = ca.repmat(ca.DM(centre_of_mass), 1, self.count)
+        shift = ca.repmat(array(centre_of_mass), 1, self.count)
         return ThrusterGeometry(ca.mtimes(rotation, self.positions - shift), ca.mtimes(rotation, self.directions))
 
     @property

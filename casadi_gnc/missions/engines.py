@@ -7,7 +7,7 @@ library's elementary functions they write the same words.
 from __future__ import annotations
 
 import ctypes
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -44,6 +44,8 @@ class Carried:
     actuators: np.ndarray
     good: np.ndarray
     tally: np.ndarray
+    #: What follows from the parameters of the flight; nothing where it has none.
+    derived: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
 
 class Engine(Protocol):
@@ -51,7 +53,11 @@ class Engine(Protocol):
 
     name: str
 
-    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def configure(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what follows from these parameters alone, and the start."""
+        ...
+
+    def first(self, x: np.ndarray, derived: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first measurement, and the law's memory at it."""
         ...
 
@@ -65,7 +71,7 @@ class _Flight(ctypes.Structure):
         (name, ctypes.c_long) for name in ("first", "samples", "decimation")
     ]
     _fields_ += [(name, ctypes.c_void_p) for name in ("allocator", "allocation_data", "allocation_work")]
-    _fields_ += [("seed", ctypes.c_ulonglong)]
+    _fields_ += [("seed", ctypes.c_ulonglong), ("derived", ctypes.c_void_p)]
 
 
 _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 7)
@@ -74,6 +80,7 @@ _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] *
 def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc") -> str:
     """Return the C of a whole flight: every tape and the loop over them."""
     plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
+    configure = tapes.functions.get("configure")
 
     def called(name: str, sample: str = "s->", **places: str) -> str:
         """Return the call of a tape; `sample` owns what one evaluation of the controller leaves behind."""
@@ -95,6 +102,9 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         report=scheme.actuation.allocator.report.size,
         row=tapes.row.size,
         tally=tapes.tally.size,
+        batch=configure is not None,
+        parameters=configure.numel_in("p") if configure is not None else 0,
+        derived=configure.numel_out("derived") if configure is not None else 0,
         substeps=timing.substeps,
         period=c_constant(timing.sample_period),
         symbolic=tapes.symbolic,
@@ -126,6 +136,8 @@ def _places(sample: str) -> dict[str, str]:
         "uniform": "uniform",
         "good": "flight->good",
         "actuators": "flight->actuators",
+        "derived": "flight->derived",
+        "p": "p",
     }
 
 
@@ -157,18 +169,29 @@ class CompiledEngine:
         elif not tapes.symbolic:
             self._solve = allocator.start()
         library = compilers.load(self.source, include=include, flags=flags, units=units, compiler=self.compiler)
+        self.library, self.compiler_flags = library, flags
         self._start, self._fly, self._memory = library.gnc_start, library.gnc_fly, scheme.law.memory.size
+        self._configured = tapes.functions.get("configure")
         self._measurements, self._seed = mission.truth.measurement.size, mission.noise.seed
         self._fly.restype, self._fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
         self._failure: BaseException | None = None
         self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
         self._callback = _ALLOCATOR(self._allocate)
 
-    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def configure(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what follows from these parameters, and the start."""
+        assert self._configured is not None
+        p = np.ascontiguousarray(values, dtype=float)
+        derived, x = (np.zeros(self._configured.numel_out(name)) for name in ("derived", "x"))
+        self.library.gnc_configure(*(ctypes.c_void_p(column.ctypes.data) for column in (p, derived, x)))
+        return derived, x
+
+    def first(self, x: np.ndarray, derived: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first measurement, and the law's memory at it."""
         memory, measured = np.zeros(self._memory), np.zeros(self._measurements)
-        at, m, good = (ctypes.c_void_p(column.ctypes.data) for column in (x, memory, measured))
-        self._start(at, ctypes.c_ulonglong(self._seed), m, good)
+        at, m, good, follows = (ctypes.c_void_p(column.ctypes.data) for column in (x, memory, measured, derived))
+        last = () if self._configured is None else (follows,)
+        self._start(at, ctypes.c_ulonglong(self._seed), m, good, *last)
         return measured, memory
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
@@ -177,7 +200,9 @@ class CompiledEngine:
         allocator = None if self._solve is None else ctypes.cast(self._callback, ctypes.c_void_p)
         memory = self._online.memory if self._online is not None else (None, None)
         pointers = (column.ctypes.data for column in columns)
-        flight = _Flight(*pointers, first, samples, decimation, allocator, *memory, self._seed)
+        flight = _Flight(
+            *pointers, first, samples, decimation, allocator, *memory, self._seed, carried.derived.ctypes.data
+        )
         flown = self._fly(ctypes.byref(flight))
         if self._failure is not None:
             failure, self._failure = self._failure, None

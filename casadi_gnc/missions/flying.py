@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from importlib import metadata
 from typing import Any
 
@@ -16,6 +17,7 @@ from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engin
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.parameters import Varied
 from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.timing import Mode
@@ -71,6 +73,46 @@ def fly(
     built = tapes.tapes_of(mission, chosen)
     runner, notes = _engine(mission, chosen, built, engine, maths)
     carried = begin(mission, built, runner)
+    return _flown(mission, chosen, built, runner, carried, decimation, maths, notes, progress)
+
+
+def fly_case(
+    varied: Varied,
+    values: Sequence[float] | np.ndarray,
+    seed: int,
+    *,
+    engine: EngineName = "c",
+    maths: Math = "gnc",
+    decimation: int | None = None,
+    progress: Progress | None = None,
+) -> Flight:
+    """Fly a mission whose parameters are columns with some values of them, noise drawn from `seed`.
+
+    The text that flies is that of every other case: the words are those of a batch. Other arguments as for `fly`.
+    """
+    mission = replace(varied.mission, noise=replace(varied.mission.noise, seed=seed), parts=varied.mission.parts_asked)
+    chosen = mission.schemes[0]
+    built = varied.tapes
+    runner, notes = _engine(mission, chosen, built, engine, maths)
+    carried = begin(mission, built, runner, np.array(values, dtype=float))
+    every = mission.timing.record_every if decimation is None else decimation
+    return _flown(mission, chosen, built, runner, carried, every, maths, notes, progress, told_of=varied.nominal)
+
+
+def _flown(
+    mission: Mission,
+    chosen: Scheme,
+    built: tapes.Tapes,
+    runner: Engine,
+    carried: Carried,
+    decimation: int,
+    maths: Math,
+    notes: tuple[str, ...],
+    progress: Progress | None,
+    told_of: Mission | None = None,
+) -> Flight:
+    """Run all samples; `told_of` is the mission in numbers where the flown one has symbols."""
+    known = told_of or mission
     total, chunk = mission.timing.samples, _CHUNK if built.symbolic else 200
     record = _room(-(-total // decimation), built.row.size)
     started, flown = time.perf_counter(), 0
@@ -87,7 +129,7 @@ def fly(
         "mode": mission.timing.mode,
         "feedback": chosen.feedback,
         "seed": mission.noise.seed if mission.truth.noise.size else None,
-        "problem_sha256": mission.digest,
+        "problem_sha256": known.digest,
         "casadi_gnc": metadata.version("casadi-gnc"),
         "casadi": metadata.version("casadi"),
         "compiler": runner.compiler.version if isinstance(runner, CompiledEngine) else "",
@@ -107,8 +149,8 @@ def fly(
         made=made,
         seconds=seconds,
         notes=(
-            *mission.craft.notes(),
-            *cautions(chosen),
+            *known.craft.notes(),
+            *cautions(known.scheme(chosen.name)),
             *notes,
             *_undefined(mission, values, raised),
             *_left(mission, built, record),
@@ -130,16 +172,23 @@ def _room(rows: int, columns: int) -> np.ndarray:
     return np.zeros((rows, columns))
 
 
-def begin(mission: Mission, built: tapes.Tapes, runner: Engine) -> Carried:
-    """Return the columns at t = 0: the mission's start, the law's first memory, actuators at rest."""
-    x = np.array(mission.start, dtype=float)
-    good, memory = runner.first(x)
+def begin(mission: Mission, built: tapes.Tapes, runner: Engine, values: np.ndarray | None = None) -> Carried:
+    """Return the columns at t = 0: the mission's start, the law's first memory, actuators at rest.
+
+    With parameters, `values` are theirs.
+    """
+    if values is None:
+        derived, x = np.zeros(0), np.array(mission.start, dtype=float)
+    else:
+        derived, x = runner.configure(values)
+    good, memory = runner.first(x, derived)
     return Carried(
         x=x,
         m=memory,
         actuators=np.zeros(mission.truth.inputs.size),
         good=good,
         tally=metrics.fresh(tuple(mission.metrics), built.tally),
+        derived=derived,
     )
 
 

@@ -59,10 +59,15 @@ class VirtualMachineEngine:
         self._report = np.zeros(scheme.actuation.allocator.report.size)
         self._solve: Allocate | None = None if tapes.symbolic else scheme.actuation.allocator.start()
 
-    def first(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def configure(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what follows from these parameters alone, and the start."""
+        answer = self._tape["configure"](p=values)
+        return answer["derived"], answer["x"]
+
+    def first(self, x: np.ndarray, derived: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first measurement, and the law's memory at it."""
-        measured = self._tape["sense"].one(t=0.0, x=x, noise=self._draw(0))
-        return measured, self._tape["start"].one(y=measured)
+        measured = self._tape["sense"].one(t=0.0, x=x, noise=self._draw(0), derived=derived)
+        return measured, self._tape["start"].one(y=measured, derived=derived)
 
     def _draw(self, sample: int) -> np.ndarray:
         """Return the normal numbers of a sample, held over `every` sample periods."""
@@ -94,6 +99,7 @@ class VirtualMachineEngine:
         """Return the columns of a sample completed by what the controller computes."""
         tape = self._tape
         s = {**s, "good": carried.good, "actuators": carried.actuators, "report": self._report, "allocation_flags": 0.0}
+        s["derived"] = carried.derived
         if "stage" in tape:
             return {**s, **tape["stage"](**s)}
         s["y"] = tape["sense"].one(**s)
@@ -119,7 +125,7 @@ class VirtualMachineEngine:
         slopes = [self._slope(s)]
         for length in (h / 2, h / 2, h):
             moved = tape["point"].one(state=state, slope=slopes[-1], length=length)
-            at = {"t": t + length, "x": moved[:n], "m": moved[n:], "noise": s["noise"]}
+            at = {"t": t + length, "x": moved[:n], "m": moved[n:], "noise": s["noise"], "derived": carried.derived}
             slopes.append(self._slope(self._control(carried, at)))
         joined = tape["join"].one(state=state, **{f"k{i}": slope for i, slope in enumerate(slopes, 1)})
         carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -17,6 +17,7 @@ from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
 from casadi_gnc.guests import GuestFile
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions import fitting, functions, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
@@ -26,6 +27,7 @@ from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.stepper import Stepper
 from casadi_gnc.missions.timing import Noise, Timing
+from casadi_gnc.tables.part import plain
 
 #: Changes of `with_scheme` that are of the scheme; all others are gains of its law.
 _OF_A_SCHEME = ("law", "feedback", "actuation", "title")
@@ -83,7 +85,7 @@ class Mission:
     def __post_init__(self, parts: Parts | None) -> None:
         fitting.refuse_strangers(self)
         if parts is not None:
-            self.__dict__["_parts"] = parts
+            self.__dict__["parts_asked"] = parts
         hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
         held = (
             each if each.law.hold == hold else replace(each, law=replace(each.law, hold=hold)) for each in self.schemes
@@ -95,19 +97,20 @@ class Mission:
         object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
 
     @cached_property
-    def _parts(self) -> Parts:
+    def parts_asked(self) -> Parts:
+        """What the craft has answered."""
         return Parts(self.craft)
 
     @cached_property
     def truth(self) -> Plant:
         """The plant: what truly moves, and what the sensors say."""
-        return self._parts.plant
+        return self.parts_asked.plant
 
     @cached_property
-    def start(self) -> list[float]:
+    def start(self) -> list[Any]:
         """The plant's state at t = 0, in its order."""
-        by_signal = {**self._parts.start, **self.start_from}
-        return [float(value) for name in self.truth.state.names for value in _flat(by_signal[name])]
+        by_signal = {**self.parts_asked.start, **self.start_from}
+        return [value for name in self.truth.state.names for value in array(plain(by_signal[name])).elements()]
 
     @cached_property
     def target(self) -> Mapping[str, Sequence[float]]:
@@ -143,7 +146,7 @@ class Mission:
         Raises `LawError` where a law cannot work at that sample period.
         """
         changed = self._noting(
-            replace(self, timing=replace(self.timing, **changes), parts=self._parts),
+            replace(self, timing=replace(self.timing, **changes), parts=self.parts_asked),
             keys_of_timing(self.timing, changes),
         )
         for scheme in changed.schemes:
@@ -162,7 +165,7 @@ class Mission:
         paths = {f"scheme.{scheme.name}.law.{key}": value for key, value in changes.items()}
         paths |= {f"scheme.{scheme.name}.{key}": value for key, value in own.items()}
         changed = replace(scheme, **{**own, "law": replace(law, **changes) if changes else law})
-        return self._noting(replace(self, schemes=(changed,), parts=self._parts), paths)
+        return self._noting(replace(self, schemes=(changed,), parts=self.parts_asked), paths)
 
     def _noting(self, changed: Mission, paths: Mapping[str, Any]) -> Mission:
         """Return a changed mission that has the file of this one, with the changes."""
@@ -253,10 +256,6 @@ def _restored(files: tuple[GuestFile, ...], content: bytes) -> Mission:
     own = pickle.loads(content)
     origin = own.pop("origin")
     return Mission(**own).read_from(origin)
-
-
-def _flat(values: Any) -> list[float]:
-    return ca.DM(values).nonzeros() if not isinstance(values, (int, float)) else [float(values)]
 
 
 def _digest(mission: Mission) -> str:

@@ -10,12 +10,13 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.asking import ask, column
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.signals import Layout
-from casadi_gnc.tables.part import MisfitError
+from casadi_gnc.tables.part import MisfitError, plain
 
 
 class Parts:
@@ -59,12 +60,12 @@ class Parts:
             raise FlightError(f"{name} {told}; give each of them, and nothing else")
         for signal in state.signals:
             try:
-                numbers = np.asarray(start[signal.name], dtype=float).ravel()
-            except (TypeError, ValueError):
+                numbers = array(plain(start[signal.name]))
+            except (TypeError, ValueError, NotImplementedError):
                 raise FlightError(f"{name} gives {start[signal.name]!r} for {signal.name}, expected numbers") from None
-            if numbers.size != signal.size:
-                raise FlightError(f"{name} gives {numbers.size} numbers of {signal.name}, expected {signal.size}")
-            if not np.isfinite(numbers).all():
+            if numbers.numel() != signal.size:
+                raise FlightError(f"{name} gives {numbers.numel()} numbers of {signal.name}, expected {signal.size}")
+            if is_number(numbers) and not np.isfinite(np.array(numbers)).all():
                 raise FlightError(f"{name} gives a number of {signal.name} that is not finite")
         return start
 

@@ -18,6 +18,7 @@ join      state, k1, k2, k3, k4 -> state, the stages' sum         (continuous mo
 settle    x -> x in the representation kept between steps
 observe   everything of a sample -> one row of the record
 tally     row, tally -> tally, the running metrics
+configure p -> derived, x: what follows from the parameters alone, and the start (where there are parameters)
 ========  =====================================================================================
 
 Ports have the names of columns, so whoever runs a tape, in C or by CasADi's machine, finds its arguments by
@@ -43,6 +44,10 @@ from casadi_gnc.signals import Layout
 
 if TYPE_CHECKING:
     from casadi_gnc.missions.mission import Mission
+    from casadi_gnc.missions.parameters import Parameters
+
+#: Arguments and results of a tape, expressions by name.
+Ports = tuple[dict[str, Any], dict[str, Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,58 +85,76 @@ def call(tape: ca.Function, places: Mapping[str, str]) -> str:
     return f"{tape.name()}({', '.join(places[name] for name in (*tape.name_in(), *tape.name_out()))})"
 
 
-def tapes_of(mission: Mission, scheme: Scheme) -> Tapes:
-    """Return all tapes of a scheme in the mission's mode."""
+def tapes_of(mission: Mission, scheme: Scheme, parameters: Parameters | None = None) -> Tapes:
+    """Return all tapes of a scheme in the mission's mode.
+
+    With parameters there is one more, `configure`, from the parameters to the start and to `derived`: all that
+    follows from them alone, which the other tapes take as one more port.
+    """
     loop = Loop(mission, scheme)
     s, plant, timing, symbolic = loop.symbols(), mission.truth, mission.timing, scheme.actuation.is_symbolic
     told = {"told": s.actuators}
     sample = {"accepted": s.y, "memory": s.m, **s.ports("wanted", "limited"), **told}
-    tapes = {
-        "sense": function("sense", s.ports("t", "x", "noise"), {"y": loop.sensed(s.t, s.x, s.noise)}),
-        "before": function(
-            "before", s.ports("t", "y", "good", "m", "actuators"), loop.before(s.t, s.y, s.good, s.m, s.actuators)
-        ),
-        "settle": function("settle", s.ports("x"), {"settled": loop.settled(s.x)}),
+    parts: dict[str, Ports] = {
+        "sense": (s.ports("t", "x", "noise"), {"y": loop.sensed(s.t, s.x, s.noise)}),
+        "before": (s.ports("t", "y", "good", "m", "actuators"), loop.before(s.t, s.y, s.good, s.m, s.actuators)),
+        "settle": (s.ports("x"), {"settled": loop.settled(s.x)}),
         "observe": _observe(loop),
     }
     if plant.noise.size:
         uniform = ca.SX.sym("uniform", noise.uniform_count(plant.noise.size))
         drawn = noise.normals(uniform, plant.noise.size, mission.noise.truncation)
-        tapes["draw"] = function("draw", {"uniform": uniform}, {"noise": drawn})
+        parts["draw"] = ({"uniform": uniform}, {"noise": drawn})
     if symbolic:
         answer = loop.allocated(s.y, s.limited, s.actuators, s.lower, s.upper)
         given = {"accepted": s.y, **s.ports("limited", "actuators", "lower", "upper")}
-        tapes["allocate"] = function("allocate", given, {"told": answer})
+        parts["allocate"] = (given, {"told": answer})
     if timing.mode == "sampled":
         later = loop.remembered(s.t, s.y, s.m, s.wanted, s.limited, s.actuators)
-        tapes["after"] = function("after", {"t": s.t, **sample}, {"m": later})
+        parts["after"] = ({"t": s.t, **sample}, {"m": later})
         stepped = loop.stepped(s.t, s.x, s.actuators, s.noise)
-        tapes["plant"] = function("plant", {**s.ports("t", "x"), **told, "noise": s.noise}, {"stepped": stepped})
+        parts["plant"] = ({**s.ports("t", "x"), **told, "noise": s.noise}, {"stepped": stepped})
     else:
         if symbolic:
-            tapes["stage"] = _stage(loop)
+            parts["stage"] = _stage(loop)
         else:
             achieved = loop.achieved(s.y, s.limited, s.actuators)
             flowing = loop.flowing(s.t, loop.seen(s.y), s.m, s.wanted, achieved)
             slope = ca.vertcat(loop.moved(s.t, s.x, s.actuators, s.noise), flowing)
-            tapes["flow"] = function("flow", {**s.ports("t", "x"), **sample, "noise": s.noise}, {"slope": slope})
-        tapes.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
+            parts["flow"] = ({**s.ports("t", "x"), **sample, "noise": s.noise}, {"slope": slope})
+        parts.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
     tally, fold = metrics.fold(tuple(mission.metrics), row_of(loop))
-    tapes["tally"] = fold
-    tapes["start"] = function("start", s.ports("y"), {"m": loop.started(ca.SX(0), s.y)})
-    return Tapes(tapes, row_of(loop), tally, symbolic)
+    parts["start"] = (s.ports("y"), {"m": loop.started(ca.SX(0), s.y)})
+    if parameters is not None:
+        parts = _configured(parts, parameters, ca.SX(ca.vertcat(*mission.start)))
+    built = {name: function(name, *ports) for name, ports in parts.items()}
+    return Tapes({**built, "tally": fold}, row_of(loop), tally, symbolic)
 
 
-def _observe(loop: Loop) -> ca.Function:
-    """Return the tape that lays out one row of the record, status bits completed."""
+def _configured(parts: dict[str, Ports], parameters: Parameters, start: ca.SX) -> dict[str, Ports]:
+    """Return the ports of all tapes with what follows from the parameters alone moved to `configure`."""
+    every = [ca.densify(ca.SX(value)) for _, outputs in parts.values() for value in outputs.values()]
+    left, symbols, found = ca.extract_parametric(ca.cse(every), parameters.symbols, {"extract_trivial": True})
+    derived, rest = ca.vertcat(*symbols) if symbols else ca.SX(0, 1), iter(left)
+    made: dict[str, Ports] = {}
+    for name, (inputs, outputs) in parts.items():
+        results = {port: next(rest) for port in outputs}
+        needed = ca.depends_on(ca.vertcat(*map(ca.vec, results.values())), derived)
+        made[name] = ({**inputs, "derived": derived} if needed else inputs, results)
+    answers = {"derived": ca.vertcat(*found) if found else ca.SX(0, 1), "x": start}
+    return {**made, "configure": ({"p": parameters.symbols}, answers)}
+
+
+def _observe(loop: Loop) -> Ports:
+    """Return the ports of the tape that lays out one row of the record, status bits completed."""
     s = loop.symbols()
     flags, report = ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report")
     row = observed(loop, s, flags, report)
     given = {**s.ports("t", "x"), "accepted": s.y, "memory": s.m, **s.ports("wanted", "limited")}
-    return function("observe", {**given, "told": s.actuators, "flags": flags, "report": report}, {"row": row})
+    return {**given, "told": s.actuators, "flags": flags, "report": report}, {"row": row}
 
 
-def _stage(loop: Loop) -> ca.Function:
+def _stage(loop: Loop) -> Ports:
     """Return the controller at a point of the integrator, and the rates of plant and memory that follow."""
     s = loop.symbols()
     given = s.ports("t", "x", "good", "m", "actuators", "noise")
@@ -142,16 +165,14 @@ def _stage(loop: Loop) -> ca.Function:
     moved = loop.flowing(s.t, seen, first["memory"], first["wanted"], effort)
     slope = ca.vertcat(loop.moved(s.t, s.x, told, s.noise), moved)
     kept = {name: first[name] for name in ("accepted", "memory", "wanted", "limited", "flags")}
-    return function("stage", given, {"slope": slope, **kept, "told": told})
+    return given, {"slope": slope, **kept, "told": told}
 
 
-def _integrator(size: int, h: float) -> dict[str, ca.Function]:
+def _integrator(size: int, h: float) -> dict[str, Ports]:
     state, slope, length = ca.SX.sym("state", size), ca.SX.sym("slope", size), ca.SX.sym("length")
     k = [ca.SX.sym(f"k{i}", size) for i in range(1, 5)]
     joined = join(state, h, *k)
     return {
-        "point": function(
-            "point", {"state": state, "slope": slope, "length": length}, {"moved": state + length * slope}
-        ),
-        "join": function("join", {"state": state, "k1": k[0], "k2": k[1], "k3": k[2], "k4": k[3]}, {"joined": joined}),
+        "point": ({"state": state, "slope": slope, "length": length}, {"moved": state + length * slope}),
+        "join": ({"state": state, "k1": k[0], "k2": k[1], "k3": k[2], "k4": k[3]}, {"joined": joined}),
     }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import casadi as ca
 from pydantic import Field, field_validator, model_validator
 
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import Angles, Matrix, Part
@@ -30,7 +31,7 @@ class Orientation(Part):
     def turned(self) -> ca.DM | None:
         """Return the rotation that is given, (3, 3), or None if there is none."""
         if self.rotation is not None:
-            return ca.DM(self.rotation)
+            return array(self.rotation)
         if self.rotation_321_rad is not None:
             return attitude.frame_rotation(*self.rotation_321_rad)
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import casadi as ca
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry
@@ -58,4 +57,4 @@ class Engine(Part):
     def torque(self, rotation: ca.DM, centre: list[float]) -> list[float]:
         """Return its torque, (3,), [N m], about a mass centre [m], in the frame that `rotation` leads to."""
         nozzle = ThrusterGeometry.from_rows([self.position_m], [self.direction]).seen_from(rotation, centre)
-        return [self.force_N * entry for entry in np.array(nozzle.effectiveness).ravel()]
+        return [self.force_N * entry for entry in nozzle.effectiveness.elements()]

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from casadi_gnc.allocation import AllocationProblem
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry
 from casadi_gnc.missions.actuation import Actuation, Actuators
@@ -80,7 +81,7 @@ class CombinedSpacecraftCraft(Craft, Orientation):
     def known_inertia(self) -> ca.DM:
         """Return the inertia as known, (3, 3), [kg m^2], about the combined centre of mass."""
         if self.inertia_kg_m2 is not None:
-            return ca.DM(self.inertia_kg_m2)
+            return array(self.inertia_kg_m2)
         return compose_inertia(
             [BodyPart(part.mass_kg, part.inertia_kg_m2, part.position_m, part.matrix()) for part in self.part]
         )
@@ -90,7 +91,7 @@ class CombinedSpacecraftCraft(Craft, Orientation):
         truth, known = self.truth, self.known_inertia()
         centre = [c + e for c, e in zip(self.centre_of_mass_m, truth.centre_of_mass_error_m, strict=True)]
         real = self._view(self.matrix(), centre)
-        inertia = known * truth.inertia_factor if truth.inertia_kg_m2 is None else ca.DM(truth.inertia_kg_m2)
+        inertia = known * truth.inertia_factor if truth.inertia_kg_m2 is None else array(truth.inertia_kg_m2)
         return CombinedSpacecraft(
             RigidBody(inertia, real.engine_torque, self.environment.orbit_rate_rad_per_s),
             real.thrusters.effectiveness,
@@ -105,7 +106,7 @@ class CombinedSpacecraftCraft(Craft, Orientation):
     def belief(self) -> RigidBody:
         """Return the body that the flight software believes in."""
         told = self.believed.inertia_kg_m2
-        inertia = self.known_inertia() if told is None else ca.DM(told)
+        inertia = self.known_inertia() if told is None else array(told)
         return RigidBody(inertia, self._thought().engine_torque, self.environment.orbit_rate_rad_per_s)
 
     def actuators(self) -> Actuators:

@@ -24,6 +24,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.disturbances import Harmonics
 from casadi_gnc.mechanics.rigid_body import RigidBody
@@ -109,9 +110,9 @@ class BodyPart:
 
 def compose_inertia(parts: list[BodyPart]) -> ca.DM:
     """Return J = sum R J R' + m (p'p I - p p'), (3, 3), [kg m^2], about the common centre (eq. 70)."""
-    total = ca.DM.zeros(3, 3)
+    total: Any = ca.DM.zeros(3, 3)
     for part in parts:
-        r, p = ca.DM(part.rotation), ca.DM(part.position)
-        own = ca.mtimes([r, ca.DM(part.inertia), r.T])
-        total += own + part.mass * (ca.dot(p, p) * ca.DM.eye(3) - ca.mtimes(p, p.T))
+        r, p = array(part.rotation), array(part.position)
+        own = ca.mtimes([r, array(part.inertia), r.T])
+        total = total + own + part.mass * (ca.dot(p, p) * ca.DM.eye(3) - ca.mtimes(p, p.T))
     return total

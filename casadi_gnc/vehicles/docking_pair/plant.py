@@ -32,6 +32,7 @@ from typing import Any, Literal
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array, is_zero
 from casadi_gnc.mechanics import dipoles
 from casadi_gnc.mechanics.dipoles import TargetDipole
 from casadi_gnc.mechanics.disturbances import Harmonics
@@ -80,7 +81,7 @@ class FaultProfile:
         for piece in self.pieces:
             value = piece.constant + piece.amplitude * ca.sin(piece.rate * t + piece.phase)
             share = ca.if_else(ca.logic_and(t > piece.start, t <= piece.stop), value, share)
-        return ca.DM(list(self.force)) * share
+        return array(self.force) * share
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,8 @@ class DockingPair(Plant):
     @property
     def noise(self) -> Layout:
         """White noise of the two measured signals, where there is any."""
-        return self.measurement if self.white.position or self.white.velocity else Layout()
+        quiet = is_zero(self.white.position) and is_zero(self.white.velocity)
+        return Layout() if quiet else self.measurement
 
     @property
     def outputs(self) -> Layout:

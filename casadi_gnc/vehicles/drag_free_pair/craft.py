@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, cast
 
-import casadi as ca
 from pydantic import Field
 
 from casadi_gnc.checking import manoeuvre
 from casadi_gnc.checks import Check
 from casadi_gnc.laws.drag_free import DragFree
 from casadi_gnc.laws.drag_free_motions import Satellite
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics.circular_orbit import CircularOrbit
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.missions.actuation import Actuation
@@ -58,7 +58,7 @@ class DragFreePairCraft(Craft):
         """Return the truth."""
         return DragFreePair(
             self.mass_kg,
-            RigidBody(ca.DM(self.inertia_kg_m2)),
+            RigidBody(array(self.inertia_kg_m2)),
             self._circular_orbit(),
             self.environment.disturbance(),
             self.rate_limit_rad_per_s,
@@ -72,7 +72,7 @@ class DragFreePairCraft(Craft):
 
     def belief(self) -> Satellite:
         """Return mass and inertia from which the estimates start, and the orbit."""
-        return Satellite(self.believed.mass_kg, ca.DM(self.believed.inertia_kg_m2), self._circular_orbit())
+        return Satellite(self.believed.mass_kg, array(self.believed.inertia_kg_m2), self._circular_orbit())
 
     def actuation(self, keys: Part | None = None) -> Actuation:
         """Return the actuation of a scheme: every axis is clipped by itself."""

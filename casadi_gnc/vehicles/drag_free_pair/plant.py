@@ -31,6 +31,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.circular_orbit import CircularOrbit
 from casadi_gnc.mechanics.disturbances import OrbitalDisturbance
@@ -83,7 +84,7 @@ class DragFreePair(Plant):
     @property
     def noise(self) -> Layout:
         """Random part of the disturbance, if it has one."""
-        return Layout((Signal("disturbance", 6),) if any(self.disturbance.deviation) else ())
+        return Layout((Signal("disturbance", 6),) if self.disturbance.is_random else ())
 
     @property
     def measurement(self) -> Layout:
@@ -101,7 +102,7 @@ class DragFreePair(Plant):
         spin = now.rate + orbital
         given = actuators + self.disturbance.effort(t, self.orbit.rate)
         if self.noise.size:
-            given += ca.DM(list(self.disturbance.deviation)) * noise
+            given += array(self.disturbance.deviation) * noise
         effort = self.inputs.split(given)
         turned = self.body.acceleration(None, spin, effort.torque)
         pushed = effort.force / self.mass + self.orbit.gravity_difference(now.mrp, now.position)

@@ -14,6 +14,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from casadi_gnc.checks import Check
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics.proximity_motion import ProximityMotion
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.missions.actuation import Actuation
@@ -75,7 +76,7 @@ class ProximityPairCraft(Craft):
         sensors = self.sensors
         return ProximityPair(
             self._motion(1.0, 1.0, None),
-            ca.DM(self.target.inertia_kg_m2),
+            array(self.target.inertia_kg_m2),
             self.environment.disturbance(),
             RelativeSensor(
                 position_error=sensors.position_deviation_m,
@@ -88,7 +89,7 @@ class ProximityPairCraft(Craft):
 
     def _motion(self, mass_factor: float, inertia_factor: float, orbit_radius: float | None) -> ProximityMotion:
         """Return the relative motion with a share of the true mass and inertia."""
-        inertia, earth = ca.DM(self.inertia_kg_m2), self.orbit.gravitational_parameter_m3_per_s2
+        inertia, earth = array(self.inertia_kg_m2), self.orbit.gravitational_parameter_m3_per_s2
         body = RigidBody(inertia_factor * inertia)
         return ProximityMotion(body, mass_factor * self.mass_kg, self.hold_point_m, earth, orbit_radius)
 

@@ -30,6 +30,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import array, is_zero
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.disturbances import OrbitalDisturbance
 from casadi_gnc.mechanics.proximity_motion import ProximityMotion
@@ -61,9 +62,10 @@ class RelativeSensor:
     velocity_error: float = 0.0
     rate_error: float = 0.0
 
-    def deviations(self) -> dict[str, float]:
-        """Return the deviations by measured signal."""
-        return {name: getattr(self, name) for name in RELATIVE.names}
+    def deviations(self) -> dict[str, Any]:
+        """Return the deviations that are not zero by measured signal."""
+        every = {name: getattr(self, name) for name in RELATIVE.names}
+        return {name: value for name, value in every.items() if not is_zero(value)}
 
 
 #: The relative state.
@@ -123,8 +125,8 @@ class ProximityPair(Plant):
     @property
     def noise(self) -> Layout:
         """Random part of the disturbance, and of each measured signal that has one."""
-        pushed = [Signal("disturbance", 6)] if any(self.disturbance.deviation) else []
-        read = [Signal(name, 3) for name, deviation in self.sensor.deviations().items() if deviation]
+        pushed = [Signal("disturbance", 6)] if self.disturbance.is_random else []
+        read = [Signal(name, 3) for name in self.sensor.deviations()]
         return Layout((*pushed, *read))
 
     def inertias(self) -> dict[str, Any]:
@@ -136,8 +138,7 @@ class ProximityPair(Plant):
         now, drawn = self.state.split(x), self.noise.split(noise)
         seen = {name: getattr(now, name) for name in self.measurement.names}
         for name, deviation in self.sensor.deviations().items():
-            if deviation:
-                seen[name] = seen[name] + deviation * getattr(drawn, name)
+            seen[name] = seen[name] + deviation * getattr(drawn, name)
         return self.measurement.pack(**seen)
 
     def rate(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
@@ -146,10 +147,10 @@ class ProximityPair(Plant):
         mu = self.motion.pull(now.position)
         effort = actuators + self.disturbance.effort(t, ca.sqrt(mu))
         if "disturbance" in self.noise:
-            effort += ca.DM(list(self.disturbance.deviation)) * self.noise.split(noise).disturbance
+            effort += array(self.disturbance.deviation) * self.noise.split(noise).disturbance
         turn = attitude.dcm(now.attitude_error)
         spin_up = RigidBody(self.target_inertia).acceleration(None, self.target(x).rate)
-        coupling = ca.vertcat(ca.cross(ca.DM(self.motion.hold_point), spin_up), -spin_up)
+        coupling = ca.vertcat(ca.cross(array(self.motion.hold_point), spin_up), -spin_up)
         relative = self.motion.acceleration(now, effort)
         return ca.vertcat(
             self.motion.error_rate(now),
@@ -170,7 +171,7 @@ class ProximityPair(Plant):
     def target(self, x: Any) -> SimpleNamespace:
         """Return the target's position [m], inertial velocity [m/s] and rate [rad/s], (3,) each, target frame."""
         now = self.state.split(x)
-        back, point = attitude.dcm(now.attitude_error).T, ca.DM(self.motion.hold_point)
+        back, point = attitude.dcm(now.attitude_error).T, array(self.motion.hold_point)
         rate = ca.mtimes(back, self.motion.target_rate(now))
         return SimpleNamespace(
             position=ca.mtimes(back, now.position - now.position_error) - point,

@@ -18,6 +18,7 @@ from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import reaction_wheels
 from casadi_gnc.mechanics.actuator_faults import FaultSchedule
 from casadi_gnc.mechanics.reaction_wheels import Gyrostat, WheelArray
@@ -88,7 +89,7 @@ class WheelSpacecraftCraft(Craft, Orientation):
     def plant(self) -> WheelSpacecraft:
         """Return the truth."""
         truth, sensors, rate = self.truth, self.sensors, self.environment.orbit_rate_rad_per_s
-        inertia = ca.DM(truth.inertia_kg_m2 or self.inertia_kg_m2)
+        inertia = array(truth.inertia_kg_m2 or self.inertia_kg_m2)
         return WheelSpacecraft(
             Gyrostat(inertia, orbit_rate=rate, wheels=self._array(truth.centre_of_mass_error_m)),
             self.environment.disturbance(),
@@ -106,7 +107,7 @@ class WheelSpacecraftCraft(Craft, Orientation):
     def belief(self) -> Gyrostat:
         """Return the craft as known, with its wheels."""
         rate = self.environment.orbit_rate_rad_per_s
-        return Gyrostat(ca.DM(self.inertia_kg_m2), orbit_rate=rate, wheels=self._array(_NOWHERE))
+        return Gyrostat(array(self.inertia_kg_m2), orbit_rate=rate, wheels=self._array(_NOWHERE))
 
     def actuators(self) -> Actuators:
         """Return the wheels as known."""

@@ -36,6 +36,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.mathematics.exact import is_number, is_zero
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.actuator_faults import FaultSchedule
 from casadi_gnc.mechanics.disturbances import Harmonics
@@ -60,6 +61,11 @@ class SensorError:
 
     additive: float = 0.0
     scale: float = 0.0
+
+    @property
+    def is_none(self) -> bool:
+        """Whether the sensor is perfect."""
+        return is_zero(self.additive) and is_zero(self.scale)
 
     def distort(self, true: Any, factor: Any, errors: Any) -> Any:
         """Return the measured signal for normal numbers `factor` (1,) and `errors` (n,)."""
@@ -120,7 +126,7 @@ class WheelSpacecraft(Plant):
     @property
     def noise(self) -> Layout:
         """Normal numbers of the sensors; none where they are perfect."""
-        if self.attitude_error == self.rate_error == SensorError():
+        if self.attitude_error.is_none and self.rate_error.is_none:
             return Layout()
         return Layout((Signal("mrp_factor"), Signal("mrp_errors", 3), Signal("rate_factor"), Signal("rate_errors", 3)))
 
@@ -148,7 +154,7 @@ class WheelSpacecraft(Plant):
         """Return what the wheels make of a command, (N,), [rad/s^2]."""
         made = command if self.wheel_faults is None else self.wheel_faults.apply(t, command)
         fastest = self.body.wheels.max_speed
-        if fastest == math.inf:
+        if is_number(fastest) and fastest == math.inf:
             return made
         away = ca.logic_and(ca.fabs(speed) >= fastest, made * speed > 0)
         return ca.if_else(away, 0.0, made)

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import casadi as ca
 from pydantic import Field, model_validator
 
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import reaction_wheels
 from casadi_gnc.mechanics.actuator_faults import ActuatorFault
 from casadi_gnc.tables import matrices
@@ -30,7 +31,7 @@ class MountedWheels(Wheels):
 
     def turned(self, rotation: ca.DM, error: list[float]) -> ca.DM:
         """Return C, (3, N), where the centre of mass is off by `error` [m]; of axes as points it matters."""
-        mounted, points = ca.DM(self.axes).T, self.as_points
+        mounted, points = array(self.axes).T, self.as_points
         if points is None:
             return reaction_wheels.free_axes(rotation, mounted)
         centre = [c + e for c, e in zip(points.centre_of_mass_m, error, strict=True)]

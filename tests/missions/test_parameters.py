@@ -1,0 +1,123 @@
+"""Numbers that became columns fly as numbers do, on every engine, and what cannot be one is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import casadi_gnc
+from casadi_gnc.errors import FlightError, GncError
+from casadi_gnc.missions.flying import fly, fly_case
+from casadi_gnc.missions.parameters import vary
+
+#: Keys of each kind, by mission: truth, environment, start, orbit, sensors, faults, gains.
+KEYS = {
+    "huang2020/detumble": (
+        "observer_pinv",
+        ["truth.inertia_factor", "truth.centre_of_mass_error_m", "initial.*", "scheme.observer_pinv.law.rate_gain"],
+    ),
+    "huang2020/slew": ("funnel_robust", ["truth.inertia_factor", "environment.constant_torque_N_m", "initial.mrp"]),
+    "huang2019/wheel_faults": (None, ["fault.1.effectiveness", "initial.*", "environment.orbit_rate_rad_per_s"]),
+    "shi2020/docking": ("iobc", ["spacecraft.target_mass_kg", "orbit.eccentricity", "sensors.position_deviation_m"]),
+    "sun2018/circular_orbit": (None, ["spacecraft.mass_kg", "target.inertia_kg_m2", "initial.position_error_m"]),
+    "tao2019/case1": (None, ["spacecraft.mass_kg", "environment.constant.*", "orbit.altitude_m", "initial.mrp"]),
+}
+
+
+def shortened(name):
+    mission = casadi_gnc.load(name)
+    return mission.with_timing(duration=60 * mission.timing.sample_period)
+
+
+def words(flight):
+    return flight.samples.view(np.uint64)
+
+
+@pytest.fixture(scope="module")
+def varied():
+    return {name: vary(shortened(name), own, scheme) for name, (scheme, own) in KEYS.items()}
+
+
+def apart(one, left, right):
+    """Return the largest relative difference of states and commands; an allocator's own counts are left out."""
+    names = [*one.nominal.truth.state.names, *one.nominal.truth.inputs.names]
+    return max(np.abs(left[name] - right[name]).max() / (np.abs(left[name]).max() + 1e-300) for name in names)
+
+
+@pytest.mark.parametrize("name", KEYS)
+def test_at_their_nominal_values_columns_fly_like_the_numbers_to_rounding(varied, name):
+    one = varied[name]
+    numbers = fly(one.nominal, decimation=1)
+    columns = fly_case(one, one.parameters.nominal, one.nominal.noise.seed, decimation=1)
+    assert apart(one, numbers, columns) < 1e-6  # the allocator's gap at most; else rounding
+
+
+@pytest.mark.parametrize("name", KEYS)
+def test_other_values_fly_like_a_mission_that_has_them_as_numbers(varied, name):
+    one = varied[name]
+    values = one.parameters.nominal * (1 + 1e-3 * np.sin(np.arange(one.parameters.size) + 1.0))
+    if name == "sun2018/circular_orbit":  # a matrix stays symmetric
+        values = one.parameters.nominal * 1.001
+    columns = fly_case(one, values, one.nominal.noise.seed, decimation=1)
+    assert apart(one, fly(one.at(values), decimation=1), columns) < 1e-6
+    assert apart(one, fly(one.nominal, decimation=1), columns) > 1e-5
+
+
+@pytest.mark.parametrize("name", [name for name in KEYS if name != "huang2020/slew"])
+def test_columns_have_the_same_words_in_c_and_on_the_virtual_machine(varied, name):
+    one = varied[name]
+    flights = [
+        fly_case(one, one.parameters.nominal, 7, decimation=1, **how) for how in ({"maths": "libm"}, {"engine": "vm"})
+    ]
+    assert (words(flights[0]) == words(flights[1])).all()
+
+
+def test_what_follows_from_parameters_alone_is_computed_once(varied):
+    one = varied["huang2020/detumble"]
+    plant = one.tapes.functions["plant"]
+    assert "p" not in plant.name_in()
+    assert plant.n_instructions() <= casadi_plant(one).n_instructions()
+
+
+def casadi_plant(one):
+    from casadi_gnc.missions.tapes import tapes_of
+
+    return tapes_of(one.nominal, one.nominal.schemes[0]).functions["plant"]
+
+
+def test_a_key_may_stand_for_several_numbers():
+    one = vary(casadi_gnc.load("huang2020/detumble"), ["initial.*", "truth.centre_of_mass_error_m.2"])
+    assert one.parameters.keys[:4] == ("initial.mrp.1", "initial.mrp.2", "initial.mrp.3", "initial.rate_rad_per_s.1")
+    assert one.parameters.keys[-1] == "truth.centre_of_mass_error_m.2"
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("truht.inertia_factor", "did you mean truth"),
+        ("truth.inertia", "did you mean"),
+        ("truth.inertia_kg_m2", "write its nominal value"),
+        ("initial.mrp.4", "initial.mrp has no '4'"),
+        ("timing.duration_s", "sizes and steps follow from it"),
+        ("noise.seed", "noise of its own"),
+        ("spacecraft.thrusters.max_force_N", "the flight software knows"),
+        ("spacecraft.rate_limit_rad_per_s", "before the flight depends on it"),
+        ("spacecraft.thrusters", "no number"),
+    ],
+)
+def test_a_key_that_cannot_be_a_column_is_told_in_one_sentence(key, told):
+    with pytest.raises(FlightError, match=told) as error:
+        vary(casadi_gnc.load("huang2020/detumble"), [key])
+    assert key in str(error.value)
+    assert len(str(error.value)) < 400
+
+
+def test_one_number_cannot_follow_two_keys():
+    with pytest.raises(FlightError, match=r"'initial\.mrp\.1' is given by two keys"):
+        vary(casadi_gnc.load("huang2020/detumble"), ["initial.mrp.1", "initial.*"])
+
+
+def test_values_that_no_craft_can_have_are_refused_as_a_file_would_refuse_them():
+    one = vary(casadi_gnc.load("huang2020/detumble"), ["truth.inertia_factor"])
+    with pytest.raises(GncError, match="greater than 0|more than 0"):
+        one.at([-1.0])
