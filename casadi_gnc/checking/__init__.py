@@ -8,12 +8,13 @@ adds its own by `Law.checks`, a craft by `Craft.checks`, an installed package by
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from casadi_gnc import guests
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import CheckError, GncError
+from casadi_gnc.missions import rehearsing
 from casadi_gnc.missions.checks import REGISTRY
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
@@ -21,13 +22,13 @@ from casadi_gnc.missions.scheme import Scheme
 __all__ = ["REGISTRY", "Check", "as_data", "check"]
 
 
-def check(mission: Mission, scheme: str | None = None) -> list[Check]:
+def check(mission: Mission, scheme: str | Sequence[str] | None = None) -> list[Check]:
     """Return all checks of a mission's schemes, or of one of them.
 
     Parameters
     ----------
     mission : from `casadi_gnc.load`, or made from objects.
-    scheme : its name; all by default.
+    scheme : its name, or the names of several; all by default.
 
     Raises
     ------
@@ -41,9 +42,13 @@ def check(mission: Mission, scheme: str | None = None) -> list[Check]:
     >>> [each.name for each in found if each.verdict == "fail"]
     ['funnel.floor.mrp', 'gains.anti_windup', 'sampling.closed_loop']
     """
-    chosen = mission.schemes if scheme is None else (mission.scheme(scheme),)
+    names = [scheme] if isinstance(scheme, str) else scheme
+    chosen = mission.schemes if names is None else tuple(mission.scheme(name) for name in names)
     everywhere = [*map(REGISTRY.find, REGISTRY.names())]
     own = [family for family in mission.checks if not any(family is other for other in everywhere)]
+    for one in chosen:
+        if mission.craft.rehearses(mission, one):
+            rehearsing.rehearsal(mission, one)
     families = [*everywhere, mission.craft.checks, *own]
     return [each.of(one.name) for one in chosen for family in families for each in _found(family, mission, one)]
 

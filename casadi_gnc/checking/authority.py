@@ -7,9 +7,8 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import linprog
 
-from casadi_gnc.checking import standing
+from casadi_gnc.checking import programs, standing
 from casadi_gnc.checking.allocation import allocation_slope, pushes_both_ways
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
@@ -90,18 +89,9 @@ def spanned(mission: Mission, scheme: Scheme) -> float:
     if not np.isfinite(matrix).all() or not (reach > 0).all():
         return 0.0
     scaled = matrix / reach[:, None]
-    rows, count = scaled.shape
+    rows = len(scaled)
     corners = np.vstack([np.eye(rows), -np.eye(rows)])
-    shares = []
-    for corner in corners:
-        found = linprog(
-            np.r_[np.zeros(count), -1.0],
-            A_eq=np.column_stack([scaled, -corner]),
-            b_eq=np.zeros(rows),
-            bounds=[*zip(lower, upper, strict=True), (0, 1e6)],
-        )
-        shares.append(found.x[-1] if found.status == 0 else 0.0)
-    least = float(min(shares))
+    least = float(programs.largest_shares(scaled, corners, lower, upper).min())
     return least if least > _SPANNED else 0.0
 
 
@@ -111,17 +101,8 @@ def attainable_share(mission: Mission, scheme: Scheme) -> float:
     corners = np.stack(
         np.meshgrid(*zip(actuation.limit_below, actuation.limit_above, strict=True), indexing="ij"), axis=-1
     )
-    shares = []
-    for corner in np.unique(corners.reshape(-1, matrix.shape[0]), axis=0):
-        # Variables: actuators, s; matrix F = s corner.
-        found = linprog(
-            np.r_[np.zeros(matrix.shape[1]), -1.0],
-            A_eq=np.column_stack([matrix, -corner]),
-            b_eq=np.zeros(len(corner)),
-            bounds=[*zip(actuation.lower, actuation.upper, strict=True), (0, 1e6)],
-        )
-        shares.append(found.x[-1] if found.status == 0 else 0.0)
-    return float(min(shares))
+    wanted = np.unique(corners.reshape(-1, matrix.shape[0]), axis=0)
+    return float(programs.largest_shares(matrix, wanted, actuation.lower, actuation.upper).min())
 
 
 def static_demand(mission: Mission, scheme: Scheme) -> float:
@@ -142,28 +123,20 @@ def _static_demand(mission: Mission, data: bytes, shape: tuple[int, int], *box: 
     lower, upper, below, above = (np.array(each) for each in box)
     _, drift, gain = standing.loads(mission)
     kept = standing.lasting(gain)
-    drift, gain, n = drift[kept], gain[kept], shape[1]
-    shares = []
+    if not kept.any():
+        return float("nan")
+    n = shape[1]
+    # Of actuators and s: bounds and limits grow with s.
+    grown = np.vstack(
+        [
+            np.column_stack([np.eye(n), -upper]),
+            np.column_stack([-np.eye(n), lower]),
+            np.column_stack([matrix, -above]),
+            np.column_stack([-matrix, below]),
+        ]
+    )
     # The share is convex in the load, so its largest may lie between the extremes of single rows: every time counts.
-    for k in range(len(drift)):
-        # Variables: actuators, s; bounds and limits grow with s.
-        found = linprog(
-            np.r_[np.zeros(n), 1.0],
-            A_ub=np.vstack(
-                [
-                    np.column_stack([np.eye(n), -upper]),
-                    np.column_stack([-np.eye(n), lower]),
-                    np.column_stack([matrix, -above]),
-                    np.column_stack([-matrix, below]),
-                ]
-            ),
-            b_ub=np.zeros(2 * n + 2 * len(matrix)),
-            A_eq=np.column_stack([gain[k], np.zeros(len(gain[k]))]),
-            b_eq=-drift[k],
-            bounds=[(None, None)] * n + [(0, None)],
-        )
-        shares.append(found.x[-1] if found.status == 0 else float("inf"))
-    return float(max(shares, default=float("nan")))
+    return float(programs.least_shares(grown, gain[kept], drift[kept]).max())
 
 
 def _share(taken: np.ndarray, bounds: Sequence[float]) -> np.ndarray:

@@ -121,7 +121,9 @@ class LinearLoop:
         h = mission.timing.duration / samples
         times = np.arange(samples) * h
         closed, _ = _functions(mission, self.scheme)
-        moved = np.array(closed.map(samples)(times + (0 if self.sampled else h / 2), ca.DM(x0), ca.DM(m0))).T
+        t = ca.SX.sym("t")
+        at_rest = ca.Function("at_rest", [t], [closed(t, ca.DM(x0), ca.DM(m0))])  # all but time is folded
+        moved = np.array(at_rest.map(samples)(times + (0 if self.sampled else h / 2))).T
         size = self.matrix.shape[0]
         if self.sampled:
             step, push = self.matrix, moved - np.concatenate([x0[rows], m0])
@@ -129,12 +131,24 @@ class LinearLoop:
             # exp of [[A, I], [0, 0]] h holds the exact step and the exact effect of a held push.
             joint = linalg.expm(h * np.block([[self.matrix, np.eye(size)], [np.zeros((size, 2 * size))]]))
             step, push = joint[:size, :size], moved @ joint[:size, size:].T
-        state, path = np.zeros(size), np.zeros((samples, len(rows)))
-        for k in range(samples):
-            path[k] = state[: len(rows)]
-            # An unstable part grows beyond all numbers; what it does not touch goes on.
-            state = np.clip(step @ state + push[k], -_HUGE, _HUGE)
-        return path
+        return driven(step, push)[:, : len(rows)]
+
+
+def driven(step: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """Return the states s_0 = 0, s_(k+1) = step s_k + push_k, (K, n), by doubling: a sum over 2, 4, 8 ... steps.
+
+    Parameters
+    ----------
+    step : (n, n).
+    push : (K, n); the last one moves no state that is returned.
+    """
+    path = np.vstack([np.zeros((1, len(step))), push[:-1]])
+    reach, power = 1, step
+    while reach < len(path):
+        # An unstable part grows beyond all numbers; what it does not touch goes on.
+        path[reach:] = np.clip(path[reach:] + path[:-reach] @ power.T, -_HUGE, _HUGE)
+        power, reach = np.clip(power @ power, -_HUGE, _HUGE), 2 * reach
+    return path
 
 
 @lru_cache(maxsize=_KEPT)

@@ -11,7 +11,6 @@ Against whole flights the edge comes out within 2 % of the force (Tao, Zhang 201
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -20,6 +19,7 @@ from casadi_gnc.checking.linear import target_state
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.recording import funnel_signals
+from casadi_gnc.missions.rehearsing import rehearsal
 from casadi_gnc.missions.scheme import Funnel, Scheme
 
 #: A signal is moved directly by what changes its rate by so much.
@@ -49,8 +49,6 @@ def flown_use(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
 
     All other regulated signals start at their targets; loads, limits, law and integrator are the mission's.
     """
-    from casadi_gnc.missions.flying import fly
-
     plant, alone = mission.truth, target_state(mission)
     signal = plant.state.place(funnel.signal)
     x = ca.SX.sym("x", plant.state.size)
@@ -67,7 +65,9 @@ def flown_use(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     narrowing = float(np.log(1 / _LEFT) / np.array(ca.DM(funnel.bounds.decay)).min())
     duration = min(mission.timing.duration, h * np.ceil(narrowing / h))
     begun = {name: list(alone[plant.state.place(name)]) for name in plant.state.names}
-    shown = replace(mission, start_from=begun, metrics=()).with_timing(duration=float(duration))
-    flight = fly(shown, scheme.name)
-    use = flight[funnel_signals(mission, funnel).names[-1]]
-    return float("inf") if flight.diverged or not np.isfinite(use).all() else float(use.max())
+    flown = rehearsal(mission, scheme)
+    record = flown.record(begun, float(duration))
+    if record is None:
+        return float("inf")
+    use = record[:, flown.row.place(funnel_signals(mission, funnel).names[-1])]
+    return float(use.max()) if np.isfinite(use).all() else float("inf")

@@ -119,6 +119,10 @@ class Craft(Part):
         """Yield what only this craft can say of a mission before it flies."""
         return ()
 
+    def rehearses(self, mission: Mission, scheme: Scheme) -> bool:
+        """Return whether the checks of a scheme fly it: then it is built while other checks are made."""
+        return False
+
     def true_effectivenesses(self, mission: Mission, scheme: Scheme) -> Mapping[str, Any]:
         """Return the effectivenesses, (R, N), that errors and faults may make true, by what they are."""
         return {}

@@ -7,7 +7,10 @@ library's elementary functions they write the same words.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -141,6 +144,10 @@ def _places(sample: str) -> dict[str, str]:
     }
 
 
+def _same(library: ctypes.CDLL) -> ctypes.CDLL:
+    return library
+
+
 class CompiledEngine:
     """Fly in generated C: a whole run of samples is one call."""
 
@@ -155,7 +162,9 @@ class CompiledEngine:
         *,
         compiler: compilers.Compiler | None = None,
         optimise: str = "-O2",
+        pool: Executor | None = None,
     ) -> None:
+        """Build; with a pool the compiler runs there, and what it refuses is raised by the first call."""
         self._report = scheme.actuation.allocator.report.size
         self.source = flight_source(mission, scheme, tapes, maths)
         self.compiler = compiler or compilers.find()
@@ -168,15 +177,19 @@ class CompiledEngine:
             flags, units = (*online.FAST, *flags[1:], *online.flags(allocator.problem)), online.units()
         elif not tapes.symbolic:
             self._solve = allocator.start()
-        library = compilers.load(self.source, include=include, flags=flags, units=units, compiler=self.compiler)
-        self.library, self.compiler_flags = library, flags
-        self._start, self._fly, self._memory = library.gnc_start, library.gnc_fly, scheme.law.memory.size
+        build = partial(compilers.load, self.source, include=include, flags=flags, units=units, compiler=self.compiler)
+        self._library: Callable[[], ctypes.CDLL] = pool.submit(build).result if pool else partial(_same, build())
+        self.compiler_flags, self._memory = flags, scheme.law.memory.size
         self._configured = tapes.functions.get("configure")
         self._measurements, self._seed = mission.truth.measurement.size, mission.noise.seed
-        self._fly.restype, self._fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
         self._failure: BaseException | None = None
         self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
         self._callback = _ALLOCATOR(self._allocate)
+
+    @property
+    def library(self) -> ctypes.CDLL:
+        """The library; waits for it where it is still being built."""
+        return self._library()
 
     def configure(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what follows from these parameters, and the start."""
@@ -191,7 +204,7 @@ class CompiledEngine:
         memory, measured = np.zeros(self._memory), np.zeros(self._measurements)
         at, m, good, follows = (ctypes.c_void_p(column.ctypes.data) for column in (x, memory, measured, derived))
         last = () if self._configured is None else (follows,)
-        self._start(at, ctypes.c_ulonglong(self._seed), m, good, *last)
+        self.library.gnc_start(at, ctypes.c_ulonglong(self._seed), m, good, *last)
         return measured, memory
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
@@ -203,7 +216,9 @@ class CompiledEngine:
         flight = _Flight(
             *pointers, first, samples, decimation, allocator, *memory, self._seed, carried.derived.ctypes.data
         )
-        flown = self._fly(ctypes.byref(flight))
+        fly = self.library.gnc_fly
+        fly.restype, fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
+        flown = fly(ctypes.byref(flight))
         if self._failure is not None:
             failure, self._failure = self._failure, None
             raise failure

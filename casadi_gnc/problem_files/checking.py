@@ -28,5 +28,4 @@ def check_file(problem: str | Path, schemes: list[str] | None = None) -> tuple[s
         message = f'kind is {kind!r}; check takes a file of kind "mission" or "synthesis"'
         raise ProblemError(message, document.place(("kind",)))
     mission = load(problem, strict=False)
-    names = schemes or [scheme.name for scheme in mission.schemes]
-    return mission.title or mission.name, [each for name in names for each in check(mission, name)]
+    return mission.title or mission.name, check(mission, schemes or None)

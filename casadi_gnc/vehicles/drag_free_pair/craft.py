@@ -93,13 +93,22 @@ class DragFreePairCraft(Craft):
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
         """Yield whether the law's own handling of saturation lets it keep its funnels."""
-        law = scheme.law
-        if not isinstance(law, DragFree):
-            return
-        for signal, handling in (("mrp", law.torque_saturation), ("position", law.force_saturation)):
-            if law.keeps(signal) and handling == "auxiliary":
-                yield from manoeuvre.auxiliary(mission, scheme, signal)
+        for signal in _shifted(scheme):
+            yield from manoeuvre.auxiliary(mission, scheme, signal)
+
+    def rehearses(self, mission: Mission, scheme: Scheme) -> bool:
+        """Return whether there is such a funnel."""
+        return any(funnel.signal in _shifted(scheme) for funnel in mission.funnels)
 
     def key_of(self, signal: str) -> tuple[str, ...]:
         """Return the key of [initial]."""
         return ("initial", _KEYS[signal])
+
+
+def _shifted(scheme: Scheme) -> list[str]:
+    """Return the signals whose funnel a law keeps while it shifts their errors by what saturation cost."""
+    law = scheme.law
+    if not isinstance(law, DragFree):
+        return []
+    handled = (("mrp", law.torque_saturation), ("position", law.force_saturation))
+    return [signal for signal, handling in handled if law.keeps(signal) and handling == "auxiliary"]

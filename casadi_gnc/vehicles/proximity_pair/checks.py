@@ -11,8 +11,8 @@ from casadi_gnc.checking import numbers
 from casadi_gnc.checks import Check
 from casadi_gnc.laws import ProximityTracking
 from casadi_gnc.laws.proximity_conditions import coupling_condition
-from casadi_gnc.missions.flying import fly
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.rehearsing import rehearsal
 from casadi_gnc.missions.scheme import Scheme
 
 if TYPE_CHECKING:
@@ -27,10 +27,11 @@ def checks(craft: ProximityPairCraft, mission: Mission, scheme: Scheme) -> Itera
         rate = plant.target(ca.DM(mission.start)).rate
         yield coupling_condition(scheme.law, plant.motion, plant.target_inertia, rate)
     if plant.keep_out_radius:
-        flight = fly(mission, scheme.name)
+        flown = rehearsal(mission, scheme)
+        record = flown.record()
         yield Check(
             "proximity.keep_out",
-            float("nan") if flight.diverged else float(flight["target_distance"].min()),
+            float("nan") if record is None else float(record[:, flown.row.place("target_distance")].min()),
             plant.keep_out_radius,
             "m",
             "fail",

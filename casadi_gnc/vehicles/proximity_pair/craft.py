@@ -132,6 +132,10 @@ class ProximityPairCraft(Craft):
 
         return checks(self, mission, scheme)
 
+    def rehearses(self, mission: Mission, scheme: Scheme) -> bool:
+        """Return whether there is a sphere to keep out of."""
+        return self.keep_out_radius_m > 0
+
     def orbit_shape(self, start: Sequence[float]) -> tuple[float, float]:
         """Return eccentricity and perigee radius [m] of the target's orbit from a start of the plant's state."""
         mu = self.orbit.gravitational_parameter_m3_per_s2
