@@ -133,6 +133,7 @@ def print_function(
     arguments: Sequence[str] | None = None,
     places: Mapping[str, Sequence[str]] | None = None,
     flag: str = "_Bool",
+    shared: Sequence[str] | None = None,
 ) -> str:
     """Return the C text of a `static` function with the name of `function`.
 
@@ -145,6 +146,8 @@ def print_function(
     places : for each port the C expression of each of its elements; by default elements of those pointers.
 
     flag : C type of conditions.
+    shared : print the function for LANES columns side by side, element i of lane l at `name[i * LANES + l]`, but of
+        these ports one column for all.
 
     Raises
     ------
@@ -155,8 +158,12 @@ def print_function(
         raise PrinterError(f"{function.name()} is no SX function; expand it first")
     inputs, outputs = _ports(function, "in"), _ports(function, "out")
     if places is None:
-        places = {name: [f"{name}[{i}]" for i in range(function.numel_in(name))] for name in inputs}
-        places |= {name: [f"{name}[{i}]" for i in range(function.numel_out(name))] for name in outputs}
+        lanes = {name: shared is not None and name not in shared for name in (*inputs, *outputs)}
+        sizes = {name: function.numel_in(name) for name in inputs} | {n: function.numel_out(n) for n in outputs}
+        places = {
+            name: [f"{name}[{i} * LANES + l]" if lanes[name] else f"{name}[{i}]" for i in range(size)]
+            for name, size in sizes.items()
+        }
     nodes, results = _graph(function, places)
     used, compared = _uses(nodes, [node for _, node in results])
     body = []
@@ -175,6 +182,8 @@ def print_function(
                 text = _expression(node, [nodes[i].is_flag for i in node.operands], maths, real)
             except PrinterError as error:
                 raise PrinterError(f"{function.name()}: {error}") from None
+            if shared is not None:  # both sides are evaluated: a branch would keep the loop over lanes scalar
+                text = text.replace(" && ", " & ").replace(" || ", " | ")
             text = text.format(*(f"a{i}" for i in node.operands))
         body.append(f"    const {flag if node.is_flag else 'gnc_real'} a{k} = {text};")
     zero, one = c_constant(0.0, real), c_constant(1.0, real)
@@ -185,7 +194,11 @@ def print_function(
         unused = [f"    (void){name};" for i, name in enumerate(inputs) if not _is_read(function, i)]
         unused += [f"    (void){name};" for i, name in enumerate(outputs) if not function.numel_out(i)]
     head = f"static void {function.name()}(\n    " + ",\n    ".join(arguments) + ")\n{"
-    return "\n".join([head, *unused, *body, *stores, "}", ""])
+    if shared is None:
+        return "\n".join([head, *unused, *body, *stores, "}", ""])
+    loop = ["    long l;", "#pragma omp simd", "    for (l = 0; l < LANES; l++) {"]
+    inner = [f"    {line}" for line in (*body, *stores)]
+    return "\n".join([head, loop[0], *unused, *loop[1:], *inner, "    }", "}", ""])
 
 
 def _graph(function: ca.Function, places: Mapping[str, Sequence[str]]) -> tuple[list[_Node], list[tuple[str, int]]]:

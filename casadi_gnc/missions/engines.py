@@ -69,19 +69,23 @@ class Engine(Protocol):
         ...
 
 
+#: Ports that flights side by side have in common.
+SHARED = ("t", "length")
+
+
 class _Flight(ctypes.Structure):
     _fields_ = [(name, ctypes.c_void_p) for name in ("x", "m", "actuators", "good", "tally", "record")] + [
         (name, ctypes.c_long) for name in ("first", "samples", "decimation")
     ]
     _fields_ += [(name, ctypes.c_void_p) for name in ("allocator", "allocation_data", "allocation_work")]
-    _fields_ += [("seed", ctypes.c_ulonglong), ("derived", ctypes.c_void_p)]
+    _fields_ += [("seeds", ctypes.c_void_p), ("derived", ctypes.c_void_p)]
 
 
 _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 7)
 
 
-def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc") -> str:
-    """Return the C of a whole flight: every tape and the loop over them."""
+def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc", lanes: int = 1) -> str:
+    """Return the C of whole flights, `lanes` of them side by side: every tape and the loop over them."""
     plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
     configure = tapes.functions.get("configure")
 
@@ -92,6 +96,7 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
     return template("flight.c.j2").render(
         title=f"{mission.name}, scheme {scheme.name}",
         mode=timing.mode,
+        lanes=lanes,
         maths=maths,
         real="double",
         states=plant.state.size,
@@ -117,7 +122,7 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         fused=fused,
         call=called,
         tapes=[
-            print_function(tape, maths=maths)
+            print_function(tape, maths=maths, shared=None if lanes == 1 else SHARED)
             for name, tape in tapes.functions.items()
             if not (fused and name in ("before", "allocate"))
         ],
@@ -181,7 +186,8 @@ class CompiledEngine:
         self._library: Callable[[], ctypes.CDLL] = pool.submit(build).result if pool else partial(_same, build())
         self.compiler_flags, self._memory = flags, scheme.law.memory.size
         self._configured = tapes.functions.get("configure")
-        self._measurements, self._seed = mission.truth.measurement.size, mission.noise.seed
+        self._measurements = mission.truth.measurement.size
+        self._seeds = np.array([mission.noise.seed], dtype=np.uint64)
         self._failure: BaseException | None = None
         self._sizes = (len(scheme.actuation.limit_below), mission.truth.inputs.size)
         self._callback = _ALLOCATOR(self._allocate)
@@ -204,7 +210,7 @@ class CompiledEngine:
         memory, measured = np.zeros(self._memory), np.zeros(self._measurements)
         at, m, good, follows = (ctypes.c_void_p(column.ctypes.data) for column in (x, memory, measured, derived))
         last = () if self._configured is None else (follows,)
-        self.library.gnc_start(at, ctypes.c_ulonglong(self._seed), m, good, *last)
+        self.library.gnc_start(at, ctypes.c_void_p(self._seeds.ctypes.data), m, good, *last)
         return measured, memory
 
     def run(self, carried: Carried, first: int, samples: int, decimation: int, record: np.ndarray) -> int:
@@ -213,9 +219,8 @@ class CompiledEngine:
         allocator = None if self._solve is None else ctypes.cast(self._callback, ctypes.c_void_p)
         memory = self._online.memory if self._online is not None else (None, None)
         pointers = (column.ctypes.data for column in columns)
-        flight = _Flight(
-            *pointers, first, samples, decimation, allocator, *memory, self._seed, carried.derived.ctypes.data
-        )
+        seeds, derived = self._seeds.ctypes.data, carried.derived.ctypes.data
+        flight = _Flight(*pointers, first, samples, decimation, allocator, *memory, seeds, derived)
         fly = self.library.gnc_fly
         fly.restype, fly.argtypes = ctypes.c_long, [ctypes.POINTER(_Flight)]
         flown = fly(ctypes.byref(flight))
