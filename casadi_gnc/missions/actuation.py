@@ -11,6 +11,7 @@ import casadi as ca
 from casadi_gnc.allocation import Direct
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws.efforts import TORQUE
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
 
@@ -46,7 +47,7 @@ class Actuators:
 
     def __post_init__(self) -> None:
         if not callable(self.effectiveness):
-            matrix = ca.DM(self.effectiveness)
+            matrix = array(self.effectiveness)
             object.__setattr__(self, "effectiveness", matrix)
             if matrix.shape != (self.effort.size, len(self.lower)):
                 raise FlightError(
