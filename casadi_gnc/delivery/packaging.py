@@ -14,6 +14,7 @@ from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import package, targets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
+from casadi_gnc.embedded.manifest import MOST_STEPS
 from casadi_gnc.embedded.readme import render_readme
 from casadi_gnc.errors import PackageError
 from casadi_gnc.missions.mission import Mission
@@ -22,8 +23,6 @@ from casadi_gnc.problem_files.by_name import mission_of
 
 #: Samples of a shipped flight, and how many of them have bad measurements at the end.
 STEPS, SPOILED = 1024, 24
-#: Most samples of one; more would make files of hundreds of megabytes.
-MOST_STEPS = 100_000
 REALS = {"float64": "double", "float32": "float"}
 
 

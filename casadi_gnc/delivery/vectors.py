@@ -1,4 +1,4 @@
-"""Fly a package in closed loop with its mission's plant: the vectors that it is shipped with.
+"""The vectors that a package is shipped with: a flight in closed loop with its mission's plant, flown or read.
 
 The plant runs in double precision with the elementary functions of `codegen/runtime`, so the vectors
 have the same words wherever they are made.
@@ -7,18 +7,24 @@ have the same words wherever they are made.
 from __future__ import annotations
 
 import ctypes
+import re
+from pathlib import Path
 
 import numpy as np
 
 from casadi_gnc.embedded.compare import as_numbers, as_words
 from casadi_gnc.embedded.host import HostPackage
+from casadi_gnc.embedded.manifest import MOST_STEPS, content
 from casadi_gnc.embedded.printer import print_function
+from casadi_gnc.errors import PackageError
 from casadi_gnc.mathematics.noise import uniform_count, uniforms
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.system import assets, compilers
 
+#: The bits of a number, by the type of all numbers of a package.
+WORDS = {"float64": np.dtype(np.uint64), "float32": np.dtype(np.uint32)}
 #: What bad sensors say, in turn: the controller must raise a status and stay finite.
 BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 5e-324, -0.0)
 
@@ -96,3 +102,22 @@ def _spoil(row: np.ndarray, number: int) -> np.ndarray:
     if number % 3 != 2:
         row[1 + (number * 5) % (len(row) - 1)] = BAD[number % len(BAD)]
     return row
+
+
+def read_vectors(folder: Path, real: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the words in and out of a package's vectors, one row a sample; raise `PackageError` if they are none."""
+    path, word = folder / "test" / "vectors.c", WORDS[real]
+    try:
+        text = (content(path) or b"").decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise PackageError(f"{path} cannot be read: {getattr(error, 'strerror', '') or error}") from None
+    entry = rf"0x([0-9a-f]{{1,{2 * word.itemsize}}})u(?:ll)?"
+    tables = []
+    for table in re.findall(r"\] = \{\n(.*?)\n\};", text, re.DOTALL):
+        rows = [re.findall(entry, row) for row in table.splitlines()]
+        if len(rows) > MOST_STEPS or len({len(row) for row in rows}) != 1 or not rows[0]:
+            break
+        tables.append(np.array([[int(number, 16) for number in row] for row in rows], dtype=word))
+    if len(tables) != 2 or len(tables[0]) != len(tables[1]):
+        raise PackageError(f"{path} does not hold the vectors of a flight; generate the package again")
+    return tables[0], tables[1]

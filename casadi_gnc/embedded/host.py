@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from casadi_gnc.embedded.targets import units
-from casadi_gnc.errors import CompilerError
+from casadi_gnc.errors import CompilerError, PackageError
 from casadi_gnc.system import assets, compilers
 
 #: -fno-math-errno: the square root is one instruction; the words stay the same.
@@ -49,7 +49,7 @@ class HostPackage:
             compilers.compile_in(shop, self.compiler, words, "the package")
             self._c = compilers.open_library(library)  # stays loaded when the file goes
         self._c.binding_size.restype = ctypes.c_long
-        self.state_size, self.params_size, word = (int(self._c.binding_size(i)) for i in range(3))
+        self.state_size, self.params_size, word, *self._widths = (int(self._c.binding_size(i)) for i in range(5))
         self.word = np.dtype(np.uint64 if word == 8 else np.uint32)
         self._params = np.zeros(-(-self.params_size // 8))
         self._state = np.zeros(-(-self.state_size // 8))
@@ -62,7 +62,17 @@ class HostPackage:
         self._c.binding_reset(_pointer(self._state))
 
     def replay(self, inputs: np.ndarray, outputs: int) -> np.ndarray:
-        """Run samples (K, inputs) of words from the present state; return (K, outputs) words."""
+        """Run samples (K, inputs) of words from the present state; return (K, outputs) words.
+
+        Raises
+        ------
+        PackageError
+            For other widths than the package has.
+        """
+        if [*inputs.shape[1:], outputs] != self._widths:
+            raise PackageError(
+                f"{inputs.shape} words in and {outputs} out a sample were given, the package has {self._widths}"
+            )
         given = np.ascontiguousarray(inputs, dtype=self.word)
         found = np.zeros((len(given), outputs), self.word)
         self._c.binding_replay(

@@ -7,7 +7,6 @@ done and nobody else's file is ever anywhere but where it was.
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -16,16 +15,13 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.manifest import BUILD, MANIFEST, digest, edited, read_manifest
 from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.source import allocator_files, render_header, render_source, runtime_files
-from casadi_gnc.errors import OutputError, PackageError
+from casadi_gnc.errors import OutputError
 from casadi_gnc.system import assets, temporary
 from casadi_gnc.system.exchange import replace_folder
 from casadi_gnc.system.templates import template
-
-#: Where a package's own Makefile and CMake build; never looked at.
-BUILD = "build"
-MANIFEST = "manifest.json"
 
 
 def flight_files(controller: Controller, options: Options) -> dict[str, str]:
@@ -77,39 +73,6 @@ def manifest(files: dict[str, str], about: dict[str, Any]) -> str:
     return json.dumps({"format": 1, **about, "files": hashes}, indent=2) + "\n"
 
 
-def digest(text: str) -> str:
-    """Return the SHA-256 of a text."""
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the manifest of a package folder; raise `PackageError` if it is none."""
-    path = folder / MANIFEST
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise PackageError(f"{folder} is no package: its {MANIFEST} cannot be read ({error})") from error
-    if not isinstance(found, dict) or found.get("format") != 1 or not isinstance(found.get("files"), dict):
-        raise PackageError(f"{folder} is no package of this version: its {MANIFEST} has another form")
-    return found
-
-
-def edited(folder: Path) -> list[str]:
-    """Return the files of a package that were changed, added or taken away since it was made."""
-    known = read_manifest(folder)["files"]
-    strange = []
-    for path in sorted(folder.rglob("*")):
-        inside = path.relative_to(folder).as_posix()
-        if path.is_dir() or inside == MANIFEST or inside.split("/")[0] == BUILD:
-            continue
-        if inside not in known:
-            strange.append(f"{inside} (added)")
-        elif hashlib.sha256(path.read_bytes()).hexdigest() != known[inside]:
-            strange.append(f"{inside} (changed)")
-    strange += [f"{inside} (missing)" for inside in known if not (folder / inside).is_file()]
-    return strange
-
-
 def check_room(folder: Path, force: bool = False) -> None:
     """Raise `OutputError` if a package may not be written there; called before any work is done."""
     if not folder.exists():
@@ -154,7 +117,7 @@ def write(folder: Path, build: Callable[[Path], dict[str, str]], *, force: bool 
             files = build(workshop)
             put(fresh, files)
             exists = folder.exists() and any(folder.iterdir())
-            ours = set(read_manifest(folder)["files"]) if exists else set()
+            ours = set(read_manifest(folder).files) if exists else set()
             if exists:
                 ours |= {path.relative_to(folder).as_posix() for path in (folder / BUILD).rglob("*")} | {BUILD}
             replace_folder(fresh, folder, ours, MANIFEST)

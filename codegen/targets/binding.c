@@ -9,10 +9,11 @@ int binding_init(void *params);
 void binding_reset(void *state);
 void binding_replay(void *state, const void *params, long steps, const replay_word *inputs, replay_word *outputs);
 
-/* Bytes of state (0), parameters (1) and a word (2). */
+/* Bytes of state (0), parameters (1) and a word (2); words of a sample in (3) and out (4). */
 long binding_size(int which)
 {
-    const long sizes[3] = {(long)sizeof(replay_state), (long)sizeof(replay_params), (long)sizeof(replay_word)};
+    const long sizes[5] = {(long)sizeof(replay_state), (long)sizeof(replay_params), (long)sizeof(replay_word),
+                           REPLAY_INPUTS, REPLAY_OUTPUTS};
     return sizes[which];
 }
 
