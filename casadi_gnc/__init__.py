@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from casadi_gnc.missions.mission import Mission
     from casadi_gnc.missions.panel import Panel
     from casadi_gnc.missions.plant import Plant
+    from casadi_gnc.missions.requirements import Requirement, Verdict
     from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
     from casadi_gnc.missions.timing import Noise, Timing
     from casadi_gnc.problem_files.by_name import check, fly, fly_all
@@ -56,11 +57,13 @@ _HOMES = {
     "Panel": "missions.panel",
     "Part": "tables.part",
     "Plant": "missions.plant",
+    "Requirement": "missions.requirements",
     "Scheme": "missions.scheme",
     "Signal": "signals",
     "StepStatus": "status",
     "TORQUE": "laws",
     "Timing": "missions.timing",
+    "Verdict": "missions.requirements",
     "check": "problem_files.by_name",
     "fly": "problem_files.by_name",
     "fly_all": "problem_files.by_name",
@@ -94,10 +97,12 @@ __all__ = [
     "Panel",
     "Part",
     "Plant",
+    "Requirement",
     "Scheme",
     "Signal",
     "StepStatus",
     "Timing",
+    "Verdict",
     "check",
     "fly",
     "fly_all",

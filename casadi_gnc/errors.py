@@ -79,6 +79,17 @@ class CampaignError(GncError):
     """Report a plan, a dispersion or a statistic of a campaign that cannot be had as asked."""
 
 
+class RequirementError(GncError):
+    """Report a requirement that cannot be read, or that asks for what no flight has.
+
+    `key` is the field of the requirement that it is about, "" if it is about all.
+    """
+
+    def __init__(self, message: str, key: str = "") -> None:
+        self.key = key
+        super().__init__(message)
+
+
 class SynthesisError(GncError):
     """Report matrix inequalities that cannot be posed, or a gain asked for that is not certified."""
 

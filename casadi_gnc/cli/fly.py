@@ -179,6 +179,11 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
         values = (_shown(metric, flight.metrics[metric.name]) for flight in flights)
         table.add_row(escape(metric.name.replace("_", " ") + unit), *values)
     console.print(table, soft_wrap=False)
+    if mission.requirements:
+        console.print(_judged(mission, flights), soft_wrap=False)
+        for one in mission.requirements:
+            told = f"{one.id}: {one.text} ({one.asked})" if one.text else f"{one.id}: {one.asked}"
+            console.print(told, highlight=False, markup=False)
     for flight in flights:
         for bit, (count, first) in flight.statuses.items():
             share = 100 * count / mission.timing.samples
@@ -191,6 +196,22 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
     names = ", ".join(path.name for path in written)
     console.print(f"wrote to {written[0].parent}: {names}", highlight=False, markup=False)
+
+
+def _judged(mission: Mission, flights: list[Flight]) -> Any:
+    """Return the table of the verdicts: met or not, and by how much."""
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title="Requirements")
+    table.add_column("")
+    for flight in flights:
+        table.add_column(escape(flight.scheme.replace("_", " ")), justify="right")
+    for one in mission.requirements:
+        verdicts = [flight.verdicts[one.id] for flight in flights]
+        told = [f"[{'green' if each.met else 'red'}]{each.word}[/] {escape(each.margin)}" for each in verdicts]
+        table.add_row(escape(one.id), *told)
+    return table
 
 
 def _shown(metric: Metric, value: float | None) -> str:

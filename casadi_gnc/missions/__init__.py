@@ -10,6 +10,7 @@ from casadi_gnc.missions.onboard import describe
 from casadi_gnc.missions.origin import Origin
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.plant import Plant
+from casadi_gnc.missions.requirements import Requirement, Verdict
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.stepper import Stepper
 from casadi_gnc.missions.timing import Noise, Timing
@@ -28,9 +29,11 @@ __all__ = [
     "Origin",
     "Panel",
     "Plant",
+    "Requirement",
     "Scheme",
     "Stepper",
     "Timing",
+    "Verdict",
     "describe",
     "fly",
     "fly_all",

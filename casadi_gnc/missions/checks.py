@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from casadi_gnc.registry import Registry
 
-_FAMILIES = ("geometry", "authority", "funnels", "gains", "sampling", "noise", "allocation", "numbers")
+_FAMILIES = ("geometry", "authority", "funnels", "gains", "sampling", "noise", "allocation", "numbers", "requirements")
 
 REGISTRY = Registry(
     "check",

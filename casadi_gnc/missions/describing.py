@@ -26,6 +26,7 @@ def on_one_screen(mission: Mission) -> str:
         rows += [("" if number else "schemes", f"{scheme.name}: {how}")]
     rows += [("" if n else "funnels", f"of {each.signal}") for n, each in enumerate(mission.funnels)]
     rows += [("" if n else "metrics", f"{m.name}: {m.kind} of {m.signal}") for n, m in enumerate(mission.metrics)]
+    rows += [("" if n else "required", f"{one.id}: {one.asked}") for n, one in enumerate(mission.requirements)]
     rows += [("note", note) for note in mission.craft.notes()]
     rows += [("made of", f"{mission.origin.name if mission.origin else 'objects'}, sha256 {mission.digest[:12]}")]
     title = f"Mission {mission.name}" + (f": {mission.title}" if mission.title else "")

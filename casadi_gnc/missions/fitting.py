@@ -6,16 +6,18 @@ of the craft is of the kind that the law models, and the effort it commands is w
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from casadi_gnc.errors import FlightError
+from casadi_gnc.errors import FlightError, RequirementError
 from casadi_gnc.laws import Law
 from casadi_gnc.missions import asking
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.recording import row_of
+from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.scheme import Metric, Scheme
 from casadi_gnc.missions.timing import Timing
 from casadi_gnc.signals import Layout, Signal
@@ -126,6 +128,35 @@ def refuse(mission: Mission) -> None:
         if funnel.signal not in plant.measurement:
             known = ", ".join(plant.measurement.names)
             raise FlightError(f"there is a funnel of {funnel.signal!r}, which is not measured; there is {known}")
+
+
+def refuse_requirements(mission: Mission) -> None:
+    """Raise `RequirementError` for two requirements of one id, and for one that asks for what no flight has."""
+    ids: list[str] = []
+    for one in mission.requirements:
+        if not isinstance(one, Requirement):
+            raise FlightError(f"a requirement is {_given(one)}, expected an object of a casadi_gnc.Requirement")
+        if one.id in ids:
+            raise RequirementError(f"the id {one.id!r} is given to two requirements", "id")
+        ids.append(one.id)
+        refuse_requirement(mission, one)
+
+
+def refuse_requirement(mission: Mission, asked: Requirement) -> None:
+    """Raise `RequirementError` where a requirement asks for a metric or a signal that a scheme does not have."""
+    if asked.metric:
+        known = [metric.name for metric in mission.metrics]
+        if asked.metric not in known:
+            near = difflib.get_close_matches(asked.metric, known, 1)
+            hint = f"did you mean {near[0]}?" if near else f"there is {', '.join(known) or 'none'}"
+            raise RequirementError(f"{asked.id} bounds {asked.metric!r}, which is no metric; {hint}", "metric")
+        return
+    for scheme in mission.schemes:
+        row = row_of(Loop(mission, scheme))
+        try:
+            asked.bind(row, row.symbol("row"), mission.timing.sample_period)
+        except RequirementError as error:
+            raise RequirementError(f"{error} (scheme {scheme.name})", error.key) from None
 
 
 def complete(mission: Mission, metric: Metric) -> Metric:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import FlightError, OutputError
+from casadi_gnc.missions.requirements import Verdict
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system.files import prepare_folder, write_beside
@@ -33,6 +34,7 @@ class Flight:
     made : engine, elementary functions, mode, versions, digest of the problem file.
     seconds : wall time of the samples, without building.
     notes : what a reader must know, e.g. that no compiler was found.
+    verdicts : whether each requirement of the mission was met, by its id, from every sample.
     """
 
     mission: str
@@ -46,6 +48,7 @@ class Flight:
     made: dict[str, Any]
     seconds: float
     notes: tuple[str, ...] = field(default=())
+    verdicts: dict[str, Verdict] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a signal, (K,) or (K, n)."""
@@ -78,6 +81,7 @@ class Flight:
         rows = [(name, _told(value, self.metric_units[name])) for name, value in self.metrics.items()]
         for bit, (count, first) in self.statuses.items():
             rows.append((str(bit.name), f"{count} samples, first at {first:g} s"))
+        rows += [(name, f"{one.word}, {one.margin}") for name, one in self.verdicts.items()]
         cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(told)}</td></tr>" for name, told in rows)
         notes = "".join(f"<li>{escape(note)}</li>" for note in self.notes)
         listed = f"<ul>{notes}</ul>" if notes else ""
@@ -124,6 +128,7 @@ class Flight:
                 {"status": str(bit.name), "samples": count, "first_s": first, "meaning": bit.sentences[0]}
                 for bit, (count, first) in self.statuses.items()
             ],
+            "requirements": [verdict.as_data() for verdict in self.verdicts.values()],
             "notes": list(self.notes),
             "made": self.made,
             "seconds": self.seconds,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -19,6 +20,7 @@ from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.parameters import Varied
 from casadi_gnc.missions.recording import funnel_signals
+from casadi_gnc.missions.requirements import Judge, Verdict
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.timing import Mode
 from casadi_gnc.status import StepStatus
@@ -115,11 +117,21 @@ def _flown(
     known = told_of or mission
     total, chunk = mission.timing.samples, _CHUNK if built.symbolic else 200
     record = _room(-(-total // decimation), built.row.size)
+    judges = _judges(mission, built)
     started, flown = time.perf_counter(), 0
     while flown < total:
         count = min(chunk if progress or total > _CHUNK else total, total - flown)
         kept = -(-flown // decimation)
-        flown += runner.run(carried, flown, count, decimation, record[kept:])
+        if judges:
+            every = np.zeros((count, built.row.size))
+            runner.run(carried, flown, count, 1, every)
+            thinned = every[-flown % decimation :: decimation]
+            record[kept : kept + len(thinned)] = thinned
+            for judge in judges:
+                judge.take(every)
+            flown += count
+        else:
+            flown += runner.run(carried, flown, count, decimation, record[kept:])
         if progress:
             progress(flown, total)
     seconds = time.perf_counter() - started
@@ -155,7 +167,32 @@ def _flown(
             *_undefined(mission, values, raised),
             *_left(mission, built, record),
         ),
+        verdicts=_verdicts(mission, built, carried.tally, values, judges),
     )
+
+
+def _judges(mission: Mission, built: tapes.Tapes) -> list[Judge]:
+    """Return what judges those requirements over signals that are not in the tally; it needs every sample."""
+    watched = [one.requirement for one in built.watches]
+    rest = [one for one in mission.requirements if one.formula and one not in watched]
+    return [Judge(one, built.row, mission.timing.sample_period) for one in rest]
+
+
+def _verdicts(
+    mission: Mission, built: tapes.Tapes, tally: np.ndarray, values: dict[str, float | None], judges: list[Judge]
+) -> dict[str, Verdict]:
+    """Return the verdict of every requirement, by its id, in the mission's order; a flight that diverged meets none."""
+    units = {metric.name: metric.unit for metric in mission.metrics}
+    asked = [one for one in mission.requirements if one.metric]
+    found = [Verdict(one, one.robustness(values), units[one.metric]) for one in asked]
+    found += [
+        Verdict(one.requirement, float(one.read(tally[built.tally.place(one.name)])), one.unit) for one in built.watches
+    ]
+    found += [judge.verdict() for judge in judges]
+    if StepStatus.DIVERGED in metrics.statuses(built.tally, tally):
+        found = [replace(verdict, robustness=-math.inf) for verdict in found]
+    by_id = {verdict.requirement.id: verdict for verdict in found}
+    return {one.id: by_id[one.id] for one in mission.requirements}
 
 
 def cautions(scheme: Scheme) -> tuple[str, ...]:
@@ -187,7 +224,7 @@ def begin(mission: Mission, built: tapes.Tapes, runner: Engine, values: np.ndarr
         m=memory,
         actuators=np.zeros(mission.truth.inputs.size),
         good=good,
-        tally=metrics.fresh(tuple(mission.metrics), built.tally),
+        tally=metrics.fresh(tuple(mission.metrics), built.tally, built.watches),
         derived=derived,
     )
 

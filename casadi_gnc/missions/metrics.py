@@ -16,6 +16,8 @@ sample_sum   sum of the norm over the samples of the window, without a time step
 The norm is the largest magnitude ("max") or the 2-norm ("two"); the window goes from `after` to
 `until`, both included. Settling looks at the whole flight.
 
+Requirements over signals are folded beside the metrics (`casadi_gnc.missions.requirements`).
+
 The folds are CasADi functions like everything else: every engine computes them from every sample,
 however few samples are kept. Status bits are counted in the same way, and their first times kept.
 """
@@ -30,6 +32,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.mathematics import bounds
+from casadi_gnc.missions.requirements import Watch
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.status import StepStatus
 
@@ -40,11 +43,13 @@ if TYPE_CHECKING:
 NEVER = -1.0
 
 
-def fold(metrics: Sequence[Metric], row: Layout) -> tuple[Layout, ca.Function]:
+def fold(metrics: Sequence[Metric], row: Layout, watches: Sequence[Watch] = ()) -> tuple[Layout, ca.Function]:
     """Return the layout of the tally and the function (row, tally) -> tally."""
     counts = tuple(Signal(f"count_{bit.name}") for bit in StepStatus)
     firsts = tuple(Signal(f"first_{bit.name}", 1, "s") for bit in StepStatus)
-    layout = Layout((*(Signal(_column(metric)) for metric in metrics), *counts, *firsts))
+    layout = Layout(
+        (*(Signal(_column(metric)) for metric in metrics), *counts, *firsts, *(one.signal for one in watches))
+    )
     sample, tally = row.symbol("row"), layout.symbol("tally")
     now, so_far = row.split(sample), layout.split(tally)
     parts: dict[str, Any] = {
@@ -58,6 +63,8 @@ def fold(metrics: Sequence[Metric], row: Layout) -> tuple[Layout, ca.Function]:
         count, first = getattr(so_far, f"count_{bit.name}"), getattr(so_far, f"first_{bit.name}")
         parts[f"count_{bit.name}"] = count + raised
         parts[f"first_{bit.name}"] = ca.if_else(ca.logic_and(raised, first < 0), now.time, first)
+    for one in watches:
+        parts[one.name] = one.step(sample, getattr(so_far, one.name))
     result = ca.cse([ca.SX(layout.pack(**parts))])
     return layout, ca.Function("tally", [sample, tally], result, ["row", "tally"], ["tallied"])
 
@@ -87,13 +94,15 @@ def _next(metric: Metric, signal: Any, time: Any, so_far: Any) -> Any:
     return value
 
 
-def fresh(metrics: Sequence[Metric], layout: Layout) -> np.ndarray:
+def fresh(metrics: Sequence[Metric], layout: Layout, watches: Sequence[Watch] = ()) -> np.ndarray:
     """Return the tally before the first sample."""
     tally = np.zeros(layout.size)
     for metric in metrics:
         tally[layout.place(_column(metric))] = 0.0 if metric.kind in ("sample_sum", "mean") else NEVER
     for bit in StepStatus:
         tally[layout.place(f"first_{bit.name}")] = NEVER
+    for one in watches:
+        tally[layout.place(one.name)] = one.initial
     return tally
 
 

@@ -24,6 +24,7 @@ from casadi_gnc.missions.describing import on_one_screen
 from casadi_gnc.missions.origin import Origin, keys_of_timing
 from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.plant import Plant
+from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.stepper import Stepper
 from casadi_gnc.missions.timing import Noise, Timing
@@ -47,6 +48,7 @@ class Mission:
     timing : when things happen.
     name : of files that are written.
     metrics : numbers asked of every flight.
+    requirements : what every flight must meet: bounds on metrics, and formulas over signals.
     funnels : bounds that the mission sets measured signals.
     noise : how random numbers are drawn.
     title, source : for whoever reads the results.
@@ -59,6 +61,8 @@ class Mission:
     ------
     FlightError
         For schemes of one name, a start that the plant does not have, a metric or a funnel of no signal.
+    RequirementError
+        For a requirement on a metric or a signal that is not there, and two of one id.
 
     Examples
     --------
@@ -79,6 +83,7 @@ class Mission:
     source: str = ""
     start_from: Mapping[str, Sequence[float]] = field(default_factory=dict)
     checks: Sequence[Callable[[Mission, Scheme], Iterable[Check]]] = ()
+    requirements: Sequence[Requirement] = ()
     parts: InitVar[Parts | None] = None
     origin: Origin | None = field(default=None, init=False)
 
@@ -95,6 +100,8 @@ class Mission:
         fitting.refuse(self)
         probing.probe(self)
         object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
+        object.__setattr__(self, "requirements", tuple(self.requirements))
+        fitting.refuse_requirements(self)
 
     @cached_property
     def parts_asked(self) -> Parts:
@@ -174,6 +181,11 @@ class Mission:
     def measured_by(self, metrics: Sequence[Metric]) -> Mission:
         """Note the metrics, completed, of a mission that was just made, and return the mission."""
         object.__setattr__(self, "metrics", tuple(metrics))
+        return self
+
+    def held_to(self, requirements: Sequence[Requirement]) -> Mission:
+        """Note the requirements, looked at, of a mission that was just made, and return the mission."""
+        object.__setattr__(self, "requirements", tuple(requirements))
         return self
 
     def read_from(self, origin: Origin | None) -> Mission:
@@ -262,6 +274,7 @@ def _digest(mission: Mission) -> str:
     """Return the hash of a mission that was made from objects: names of classes, data, and guests' code."""
     told = [f"{type(mission.craft).__qualname__} {mission.craft.model_dump_json()}", repr(mission.timing)]
     told += [repr(each) for each in (mission.noise, *mission.metrics, *mission.funnels, dict(mission.start_from))]
+    told += [repr(each) for each in mission.requirements]
     for scheme in mission.schemes:
         told.append(f"{scheme.name} {scheme.law!r} {scheme.actuation!r} {scheme.feedback}")
     told += [f"{file.path} {file.sha256}" for file in mission.guests()]

@@ -39,6 +39,7 @@ from casadi_gnc.mathematics.integrators import join
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.recording import observed, row_of
+from casadi_gnc.missions.requirements import Watch, watches
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.signals import Layout
 
@@ -52,12 +53,13 @@ Ports = tuple[dict[str, Any], dict[str, Any]]
 
 @dataclass(frozen=True, eq=False)
 class Tapes:
-    """Hold the functions of one mission, scheme and mode, and the layouts of their columns."""
+    """Hold the functions of one mission, scheme and mode, the layouts of their columns, and what the tally watches."""
 
     functions: dict[str, ca.Function]
     row: Layout
     tally: Layout
     symbolic: bool
+    watches: tuple[Watch, ...] = ()
 
     def __getattr__(self, name: str) -> ca.Function:
         try:
@@ -123,12 +125,14 @@ def tapes_of(mission: Mission, scheme: Scheme, parameters: Parameters | None = N
             slope = ca.vertcat(loop.moved(s.t, s.x, s.actuators, s.noise), flowing)
             parts["flow"] = ({**s.ports("t", "x"), **sample, "noise": s.noise}, {"slope": slope})
         parts.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
-    tally, fold = metrics.fold(tuple(mission.metrics), row_of(loop))
+    row = row_of(loop)
+    watched = watches(mission.requirements, row, timing.sample_period)
+    tally, fold = metrics.fold(tuple(mission.metrics), row, watched)
     parts["start"] = (s.ports("y"), {"m": loop.started(ca.SX(0), s.y)})
     if parameters is not None:
         parts = _configured(parts, parameters, ca.SX(ca.vertcat(*mission.start)))
     built = {name: function(name, *ports) for name, ports in parts.items()}
-    return Tapes({**built, "tally": fold}, row_of(loop), tally, symbolic)
+    return Tapes({**built, "tally": fold}, row, tally, symbolic, watched)
 
 
 def _configured(parts: dict[str, Ports], parameters: Parameters, start: ca.SX) -> dict[str, Ports]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from casadi_gnc.errors import GncError, LawError, ProblemError
+from casadi_gnc.errors import GncError, LawError, ProblemError, RequirementError
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import fitting
 from casadi_gnc.missions.actuation import Actuation
@@ -88,7 +88,14 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
         with complaints.about("metric", i, "signal"):
             metrics.append(fitting.complete(made, _metric(table)))
     complaints.settle()
-    return made.measured_by(metrics)
+    made = made.measured_by(metrics)
+    for i, table in enumerate(common.requirement):
+        try:
+            fitting.refuse_requirement(made, table.requirement())
+        except RequirementError as error:
+            complaints.add(("requirement", i, *filter(None, [error.key])), str(error))
+    complaints.settle()
+    return made.held_to([table.requirement() for table in common.requirement])
 
 
 @contextmanager

@@ -74,7 +74,7 @@ def _keys(at: Any, part: str, path: str, done: tuple[str, ...], rest: list[str],
 
 def _number(items: list[Any], part: str, path: str, done: tuple[str, ...]) -> int:
     """Return the place of an item that is given by its name or by its number from 1."""
-    names = [item.get("name") if isinstance(item, dict) else None for item in items]
+    names = [item.get("name", item.get("id")) if isinstance(item, dict) else None for item in items]
     if part in names:
         return names.index(part)
     if part.isdecimal() and 1 <= int(part) <= len(items):

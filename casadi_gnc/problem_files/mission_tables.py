@@ -9,8 +9,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from casadi_gnc.errors import RequirementError
+from casadi_gnc.missions.requirements import Requirement
+from casadi_gnc.missions.requirements.requirement import ID
 from casadi_gnc.missions.scheme import MetricKind
-from casadi_gnc.tables.part import Name, NonNegative, Part, Positive
+from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive
 
 
 def _is_one(value: Any) -> Any:
@@ -110,6 +113,32 @@ class MetricTable(Part):
         return self
 
 
+class RequirementTable(Part):
+    """What every flight must meet: a bound on a metric, or a formula over signals and time."""
+
+    id: Annotated[str, Field(pattern=ID, description="letters, digits, ., _ and -")]
+    text: str = Field(default="", description="in words")
+    metric: Name | None = Field(default=None, description="a metric of this file, with at_most or at_least")
+    at_most: float | None = Field(default=None, description="in the metric's unit")
+    at_least: float | None = Field(default=None, description="in the metric's unit")
+    formula: str | None = Field(default=None, description='e.g. "always[0, 600](norm(rate) <= 0.01)"')
+    share: float = Field(default=1.0, gt=0, le=1, description="of the flights that must meet it")
+    confidence: float = Field(default=0.9, gt=0, lt=1, description="with which that share must be shown")
+
+    @model_validator(mode="after")
+    def _fit(self) -> RequirementTable:
+        try:
+            self.requirement()
+        except RequirementError as error:
+            raise MisfitError(str(error), *filter(None, [error.key])) from None
+        return self
+
+    def requirement(self) -> Requirement:
+        """Return what the table says."""
+        given = self.model_dump()
+        return Requirement(**{**given, "metric": self.metric or "", "formula": self.formula or ""})
+
+
 class NoiseTable(Part):
     """How random numbers are drawn; how large each noise is stands in the craft's own tables."""
 
@@ -138,6 +167,7 @@ class MissionTables(Part):
     timing: TimingTable
     noise: NoiseTable = NoiseTable()
     metric: list[MetricTable] = []
+    requirement: list[RequirementTable] = []
     sweep: list[SweepTable] = []
     checks: list[str] = Field(default=[], description='further checks: names, or "./file.py:function"')
 
@@ -155,6 +185,15 @@ class MissionTables(Part):
         for signal in signals:
             if signals.count(signal) > 1:
                 raise ValueError(f"{signal!r} has two funnels")
+        return value
+
+    @field_validator("requirement")
+    @classmethod
+    def _ids_differ(cls, value: list[RequirementTable]) -> list[RequirementTable]:
+        ids = [each.id for each in value]
+        for i, one in enumerate(ids):
+            if one in ids[:i]:
+                raise MisfitError(f"the id {one!r} is given twice", i, "id")
         return value
 
     @field_validator("metric", "sweep")
