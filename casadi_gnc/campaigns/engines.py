@@ -136,7 +136,7 @@ class CompiledBatch:
         self.threads = threads or os.cpu_count() or 1
         self._solvers = [allocator.solver(self.compiler) for _ in range(self.threads)] if iterates else []
         self._samples = mission.timing.samples
-        self._fresh = metrics.fresh(tuple(mission.metrics), tapes.tally)
+        self._fresh = metrics.fresh(tuple(mission.metrics), tapes.tally, tapes.watches)
         plant = mission.truth
         self._widths = {
             "x": plant.state.size,

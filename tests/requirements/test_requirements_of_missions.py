@@ -9,8 +9,11 @@ import pytest
 from typer.testing import CliRunner
 
 import casadi_gnc as gnc
+from casadi_gnc.campaigns.engines import CompiledBatch
 from casadi_gnc.cli.main import app
 from casadi_gnc.errors import FlightError, ProblemError, RequirementError
+from casadi_gnc.missions.flying import fly_case
+from casadi_gnc.missions.parameters import vary
 from casadi_gnc.missions.tapes import tapes_of
 from casadi_gnc.problem_files.document import locate
 
@@ -304,3 +307,20 @@ def test_check_prints_them(tmp_path):
     )
     assert done.exit_code == 1
     assert "fail: requirement.start.A (damping_pinv): No flight can meet the requirement" in done.output
+
+
+def test_a_batch_has_the_verdicts_of_its_flights(mission):
+    """Requirements in the tally need no record: what a batch of dispersed cases says is what each flight says."""
+    asked = [*mission.requirements[1:3], gnc.Requirement("A", formula="norm(rate) >= 0.05 until[0, 250] norm(rate) <= 0.2")]
+    asked += [gnc.Requirement("B", formula="always[20](not raised(COMMAND_LIMITED)) or always[10, 20](norm(mrp) < 0.5)")]
+    short = replace(mission.with_timing(duration=250.0), requirements=asked)
+    varied = vary(short, ["initial.rate_rad_per_s"], "damping_pinv")
+    values = np.random.default_rng(3).uniform(-0.2, 0.2, (9, 3))
+    seeds = np.arange(9, dtype=np.uint64)
+    flown = CompiledBatch(varied, threads=1).fly(values, seeds)
+    assert [watch.requirement.id for watch in varied.tapes.watches] == ["ACS-2", "ACS-3", "A", "B"]
+    for watch in varied.tapes.watches:
+        robustness = watch.read(flown.tally[:, varied.tapes.tally.place(watch.name)])
+        alone = [fly_case(varied, row, 0).verdicts[watch.requirement.id].robustness for row in values[:3]]
+        assert robustness[:3].tolist() == alone
+        assert len(set(robustness.tolist())) > 1, watch.requirement
