@@ -311,8 +311,13 @@ def test_check_prints_them(tmp_path):
 
 def test_a_batch_has_the_verdicts_of_its_flights(mission):
     """Requirements in the tally need no record: what a batch of dispersed cases says is what each flight says."""
-    asked = [*mission.requirements[1:3], gnc.Requirement("A", formula="norm(rate) >= 0.05 until[0, 250] norm(rate) <= 0.2")]
-    asked += [gnc.Requirement("B", formula="always[20](not raised(COMMAND_LIMITED)) or always[10, 20](norm(mrp) < 0.5)")]
+    asked = [
+        *mission.requirements[1:3],
+        gnc.Requirement("A", formula="norm(rate) >= 0.05 until[0, 250] norm(rate) <= 0.2"),
+    ]
+    asked += [
+        gnc.Requirement("B", formula="always[20](not raised(COMMAND_LIMITED)) or always[10, 20](norm(mrp) < 0.5)")
+    ]
     short = replace(mission.with_timing(duration=250.0), requirements=asked)
     varied = vary(short, ["initial.rate_rad_per_s"], "damping_pinv")
     values = np.random.default_rng(3).uniform(-0.2, 0.2, (9, 3))
