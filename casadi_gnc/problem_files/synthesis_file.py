@@ -94,6 +94,8 @@ def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
     data.update(status=found.status.name, sentence=found.sentence(), certified=found.is_certified)
     data["gains"] = {name: gain.tolist() for name, gain in found.gains.items()} if found.is_certified else {}
     data["promised_norm"] = _finite(found.promised)
+    if found.smallest is not None:
+        data["smallest_gamma"] = [_finite(end) for end in found.smallest]
     data["poles_rad_s"] = [[float(pole.real), float(pole.imag)] for pole in found.poles]
     if found.norm is not None:
         where = _finite(found.norm.frequency_rad_s)
@@ -125,6 +127,9 @@ def _inequalities(answer: Any) -> dict[str, Any]:
         "backend": answer.backend,
         "conflict": list(answer.conflict),
         "multipliers": answer.infeasibility.shares if answer.infeasibility else {},
+        "no_point_with_entries_up_to": (
+            {name: _finite(reach) for name, reach in answer.infeasibility.reach.items()} if answer.infeasibility else {}
+        ),
         "constraints": [
             {
                 "name": one.name,

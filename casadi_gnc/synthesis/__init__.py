@@ -14,10 +14,11 @@
 
 from casadi_gnc.synthesis.analysis import Norm, h_infinity_norm, poles, stable_ratios
 from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus
-from casadi_gnc.synthesis.certificate import Check, Infeasibility, Ray
+from casadi_gnc.synthesis.certificate import Check
 from casadi_gnc.synthesis.gains import GainStatus, Synthesis
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.peak import Peak, box_vertices, peak_command
+from casadi_gnc.synthesis.proofs import Infeasibility, Ray
 from casadi_gnc.synthesis.recipes.input_ellipsoid import input_ellipsoid
 from casadi_gnc.synthesis.recipes.intermediate_observer import intermediate_observer, sample_s
 from casadi_gnc.synthesis.recipes.observer import observer

@@ -9,13 +9,14 @@ import numpy as np
 
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.backends import Claim, Found
-from casadi_gnc.synthesis.certificate import (
-    Check,
+from casadi_gnc.synthesis.certificate import Check, check, onto_equalities
+from casadi_gnc.synthesis.proofs import (
     Infeasibility,
     Ray,
+    Reach,
     bound,
-    check,
-    onto_equalities,
+    covers,
+    promising,
     prove_infeasible,
     prove_unbounded,
 )
@@ -34,7 +35,7 @@ class LmiStatus(Enum):
         "Every constraint holds, by eigenvalues computed from the data, but the objective may be improved: see gap."
     )
     NOT_CERTIFIED = "The solver's answer does not keep the constraints; enlarge the margins or take another back end."
-    INFEASIBLE = "No unknowns meet all constraints, proved by multipliers; relax one of those in conflict."
+    INFEASIBLE = "No unknowns in the stated range meet all constraints, proved by multipliers; relax one in conflict."
     UNBOUNDED = "The objective falls without end along a ray; bound the unknowns that run away."
     UNDECIDED = "The solver returned neither a point nor a proof; change units, margins or the back end."
 
@@ -54,9 +55,14 @@ class LmiAnswer:
     point : (N,), scalar unknowns in original units; NaN if there are none.
     unknowns : matrices by name.
     objective : at the point; NaN without one.
-    gap : objective less a lower bound from the multipliers, in its unit; infinite without a bound.
+    gap : objective less a lower bound from the multipliers, in its unit, for points whose unknowns, in natural
+        sizes, are at most ten times the largest at hand; infinite without a bound.
     checks : of every constraint at the point.
-    infeasibility, ray : proofs that there is no point, or no minimum; else None.
+    infeasibility : proof that there is no point in a range of the unknowns, which it states. With the status
+        UNDECIDED it covers less than was asked for. None if there is none.
+    ray : proof that there is no minimum, or None.
+    least : lower bound on the objective without any margins, in its unit: what margins cost is the objective less
+        this, at most; minus infinity without a bound.
     conflict : names of constraints that cannot be met together although any others of them can;
         empty if not sought.
     far : names of unknowns far beyond their natural size: the minimum may not be attained.
@@ -77,6 +83,7 @@ class LmiAnswer:
     claim: Claim
     conflict: tuple[str, ...] = field(default=())
     far: tuple[str, ...] = field(default=())
+    least: float = float("-inf")
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return an unknown; raise `SynthesisError` if it is not certified, or not there."""
@@ -101,7 +108,10 @@ class LmiAnswer:
             )
         if self.status.holds and self.far:
             said += f" {', '.join(self.far)} may run to infinity: add a constraint that bounds them, or price them."
-        if self.infeasibility is not None:
+        if self.infeasibility is not None and self.status is LmiStatus.UNDECIDED:
+            said += f" What is proved: there is no point with entries of {self.infeasibility.sentence()}."
+        elif self.infeasibility is not None:
+            said += f" The range: entries of {self.infeasibility.sentence()}."
             carried = [f"{name!r} {share:.0%}" for name, share in self.infeasibility.shares.items() if share > 0.01]
             said += f" The multipliers lie on {', '.join(carried)}."
             if self.conflict:
@@ -125,6 +135,7 @@ class Verdict:
     gap: float = float("inf")
     infeasibility: Infeasibility | None = None
     ray: Ray | None = None
+    least: float = float("-inf")
 
     @property
     def rank(self) -> tuple[int, float]:
@@ -136,30 +147,46 @@ class Verdict:
         return (1, -max(one.lacking for one in self.checks)) if self.checks else (0, 0.0)
 
 
-def judge(scaled: Scaled, found: Found) -> Verdict:
-    """Return what a solver's answer is worth; its claim only says which proof to try first."""
+def judge(scaled: Scaled, found: Found, within: Reach | None = None) -> Verdict:
+    """Return what a solver's answer is worth; its claim only says which proof to try first.
+
+    Parameters
+    ----------
+    within : range of the unknowns that a proof of infeasibility has to cover; see `Lmis.solve`.
+    """
     data, nothing = scaled.data, np.full(len(scaled.cost), np.nan)
     if found.claim is Claim.UNBOUNDED:
         ray = prove_unbounded(scaled, found.point)
         if ray is not None:
             return Verdict(LmiStatus.UNBOUNDED, nothing, ray=ray)
     if found.claim is Claim.INFEASIBLE:
-        proof = prove_infeasible(scaled, found.dual)
-        status = LmiStatus.UNDECIDED if proof is None else LmiStatus.INFEASIBLE
-        return Verdict(status, nothing, infeasibility=proof)
+        return _refuted(scaled, found, within) or Verdict(LmiStatus.UNDECIDED, nothing)
     if np.shape(found.point) != np.shape(scaled.cost) or not np.all(np.abs(found.point) <= _LARGEST):
         return Verdict(LmiStatus.UNDECIDED, nothing)
     y = onto_equalities(scaled, found.point)
     point = scaled.original(y)
     checks = check(data, point)
     if not all(one.holds for one in checks):
-        proof = prove_infeasible(scaled, found.dual)
-        if proof is not None:
-            return Verdict(LmiStatus.INFEASIBLE, nothing, infeasibility=proof)
-        status = LmiStatus.NOT_CERTIFIED if found.claim is Claim.SOLVED else LmiStatus.UNDECIDED
-        return Verdict(status, point, checks)
+        refuted = _refuted(scaled, found, within) if promising(scaled, found.dual) else None
+        if refuted is not None and refuted.status is LmiStatus.INFEASIBLE:
+            return refuted
+        proof = None if refuted is None else refuted.infeasibility
+        if found.claim is not Claim.SOLVED:
+            return Verdict(LmiStatus.UNDECIDED, point, checks, infeasibility=proof)
+        return Verdict(LmiStatus.NOT_CERTIFIED, point, checks)
     objective = float(data.cost @ point) + data.constant
-    gap = objective - bound(scaled, found.dual, y) if np.any(data.cost) else 0.0
+    if not np.any(data.cost):
+        return Verdict(LmiStatus.CERTIFIED, point, checks, objective, 0.0, least=objective)
+    gap, least = objective - bound(scaled, found.dual, y), bound(scaled, found.dual, y, margins=False)
     size = float(np.abs(data.cost) @ np.abs(point)) + abs(data.constant)
     status = LmiStatus.CERTIFIED if gap <= _GAP * size else LmiStatus.FEASIBLE
-    return Verdict(status, point, checks, objective, gap)
+    return Verdict(status, point, checks, objective, gap, least=least)
+
+
+def _refuted(scaled: Scaled, found: Found, within: Reach | None) -> Verdict | None:
+    """Return the verdict that multipliers of no point deserve; None if they exclude nothing."""
+    proof = prove_infeasible(scaled, found.dual, within)
+    if proof is None:
+        return None
+    status = LmiStatus.INFEASIBLE if covers(proof, within) else LmiStatus.UNDECIDED
+    return Verdict(status, np.full(len(scaled.cost), np.nan), infeasibility=proof)

@@ -15,6 +15,7 @@ from casadi_gnc.synthesis.peak import Peak, peak_command
 
 #: Poles faster than this multiple of the plant's own rates: the gain runs to infinity.
 RUNAWAY = 1e4
+_TOLD = 0.01  # of the smallest gamma: how far its bounds may be apart without a word
 
 
 class GainStatus(Enum):
@@ -57,6 +58,8 @@ class Synthesis:
     ratios : interval of r = (assumed mass) / (true mass), or of any factor of the input matrix, about one
         within which the loop stays stable; None where the loop does not hold the input matrix.
     missing : what would bound a gain that runs away.
+    smallest : between which the smallest gamma lies: a bound from the multipliers, without margins, and what was
+        reached; None where it was not sought.
     """
 
     status: GainStatus
@@ -69,6 +72,7 @@ class Synthesis:
     limit: float = float("nan")
     ratios: tuple[float, float] | None = None
     missing: str = ""
+    smallest: tuple[float, float] | None = None
 
     @property
     def is_certified(self) -> bool:
@@ -93,10 +97,18 @@ class Synthesis:
         if self.status is GainStatus.UNSTABLE or self.status is GainStatus.RUNS_AWAY:
             slowest, fastest = self.poles[0], self.poles[np.argmax(np.abs(self.poles))]
             found = f"{said} Slowest pole {slowest:.3g}, fastest {fastest:.3g} rad/s."
-            return f"{found} {self.missing}" if self.missing and self.status is GainStatus.RUNS_AWAY else found
+            found = f"{found} {self.missing}" if self.missing and self.status is GainStatus.RUNS_AWAY else found
+            return found + self._between()
         if self.status is GainStatus.INPUT_EXCEEDED and self.peak is not None:
             return f"{said} It may reach {self.peak.bound:.4g} at {self.peak.time_s:.3g} s, limit {self.limit:.4g}."
-        return said
+        return said + self._between()
+
+    def _between(self) -> str:
+        """Return a sentence where the smallest gamma is not known well, else nothing."""
+        if self.smallest is None or self.smallest[0] >= (1 - _TOLD) * self.smallest[1]:
+            return ""
+        low, high = self.smallest
+        return f" The smallest gamma is not known well: it lies between {low:.4g} and {high:.4g}."
 
 
 def failed(lmis: LmiAnswer) -> Synthesis:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -10,15 +11,18 @@ import numpy as np
 
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis import backends
-from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus, judge
+from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus, Verdict, judge
+from casadi_gnc.synthesis.backends import Claim, Found
 from casadi_gnc.synthesis.conic import ConicData, Kind
 from casadi_gnc.synthesis.extraction import Constraint, extract
-from casadi_gnc.synthesis.scaling import scale, tightened
+from casadi_gnc.synthesis.proofs import Reach, names_of, ray_data
+from casadi_gnc.synthesis.scaling import Scaled, scale, tightened
 from casadi_gnc.synthesis.unknowns import Unknown, as_sx, diagonal_index, symmetric_index, unknown
 
 _FAR = 1e4  # natural sizes beyond which an unknown may run to infinity
 _MOST_SOUGHT = 24  # constraints among which a smallest conflict is sought by leaving out one after another
 
+_MANY = 100  # unknowns from which every further look takes its time
 _TIGHTER = (4.0, 64.0)  # how many times what a point lacks is asked for on top, if the answer does not hold
 _LACKING = (LmiStatus.NOT_CERTIFIED, LmiStatus.UNDECIDED)
 _WORTH_ANOTHER_LOOK = (LmiStatus.FEASIBLE, *_LACKING)  # scaled by the point found
@@ -44,6 +48,7 @@ class Lmis:
         self._unknowns: dict[str, Unknown] = {}
         self._constraints: dict[str, Constraint] = {}
         self._objective = ca.SX(0)
+        self._data: ConicData | None = None  # of what is stated so far
 
     def symmetric(self, name: str, size: int) -> ca.SX:
         """Return an unknown symmetric matrix, (size, size), of any definiteness."""
@@ -68,7 +73,7 @@ class Lmis:
     def _declare(self, name: str, index: np.ndarray) -> ca.SX:
         if name in self._unknowns:
             raise SynthesisError(f"unknown {name!r} is declared twice; give the second another name")
-        self._unknowns[name] = unknown(name, index)
+        self._unknowns[name], self._data = unknown(name, index), None
         return self._unknowns[name].expression
 
     def psd(self, expression: Any, *, margin: float | None = None, name: str | None = None) -> None:
@@ -106,7 +111,7 @@ class Lmis:
         objective = as_sx(expression)
         if objective.shape != (1, 1):
             raise SynthesisError(f"the objective has shape {objective.shape}, expected a scalar; take its trace or sum")
-        self._objective = objective
+        self._objective, self._data = objective, None
 
     def _name(self, name: str | None) -> str:
         return name if name is not None else f"constraint {len(self._constraints) + 1}"
@@ -124,23 +129,31 @@ class Lmis:
             raise SynthesisError(f"constraint {name!r} has margin {margin!r}, expected a finite number, at least 0")
         if expression.is_empty():
             raise SynthesisError(f"constraint {name!r} is empty; leave it out")
-        self._constraints[name] = Constraint(name, kind, expression, float(margin))
+        self._constraints[name], self._data = Constraint(name, kind, expression, float(margin)), None
 
     def data(self) -> ConicData:
         """Return the conic data; raise `SynthesisError` for what is not affine, symmetric or finite."""
         if not self._unknowns or not self._constraints:
             raise SynthesisError("there are no LMIs yet; declare unknowns and state at least one constraint")
+        if self._data is not None:
+            return self._data
         symbols = ca.vertcat(*[one.symbols for one in self._unknowns.values()])
         labels = tuple(label for one in self._unknowns.values() for label in one.labels)
-        return extract(symbols, labels, list(self._constraints.values()), self._objective)
+        self._data = extract(symbols, labels, list(self._constraints.values()), self._objective)
+        return self._data
 
-    def solve(self, backend: Any = "clarabel", *, conflict: bool = True, **options: Any) -> LmiAnswer:
+    def solve(
+        self, backend: Any = "clarabel", *, conflict: bool = True, within: Reach | None = None, **options: Any
+    ) -> LmiAnswer:
         """Return the certified answer.
 
         Parameters
         ----------
         backend : name, see `casadi_gnc.synthesis.backends`, or a module of your own like those.
         conflict : whether to seek a smallest set of conflicting constraints if there is no point.
+        within : range that a proof of infeasibility must cover: a bound on the entries of all unknowns, in their
+            units, or one by name. By default it must hold for all unknowns, but for the last digits of the
+            coefficients: of those beyond the range that it states, the rounding of the data decides.
         options : of the back end; an unknown one is an error.
 
         Raises
@@ -148,34 +161,61 @@ class Lmis:
         SynthesisError
             For constraints that cannot be posed. Failure to solve them is a status.
         """
-        answer = self.attempt(self.data(), backend, **options)
+        if within is not None:
+            self._refuse_range(within)
+        answer = self.attempt(self.data(), backend, within=within, **options)
         if answer.status is LmiStatus.INFEASIBLE and conflict and len(self._constraints) <= _MOST_SOUGHT:
-            answer = replace(answer, conflict=self._conflict(backend, options))
+            answer = replace(answer, conflict=self._conflict(backend, within, options))
         return answer
 
-    def attempt(self, data: ConicData, backend: Any = "clarabel", **options: Any) -> LmiAnswer:
-        """Return the certified answer to conic data of these unknowns, as `data` returns."""
+    def _refuse_range(self, within: Reach) -> None:
+        stated = within if isinstance(within, Mapping) else {"within": within}
+        for name, value in stated.items():
+            if isinstance(within, Mapping) and name not in self._unknowns:
+                raise SynthesisError(f"within names {name!r}; the unknowns are {', '.join(self._unknowns)}")
+            if not (isinstance(value, (int, float)) and value > 0):
+                raise SynthesisError(f"within is {value!r} for {name!r}, expected a positive number")
+
+    def attempt(
+        self, data: ConicData, backend: Any = "clarabel", *, within: Reach | None = None, **options: Any
+    ) -> LmiAnswer:
+        """Return the certified answer to conic data of these unknowns, as `data` returns; `within` as in `solve`."""
         module = backends.module(backend)
-        scaled = scale(data)
+        scaled = scale(data, middle=len(data.cost) > _MANY)
         natural = scaled.unit
         try:
             found = module.solve(scaled, **options)
         except TypeError as error:
             raise SynthesisError(f"back end {backend!r}: {error}") from error
-        verdict = judge(scaled, found)
+        verdict = judge(scaled, found, within)
+        if verdict.status is LmiStatus.NOT_CERTIFIED and len(data.cost) > _MANY:  # mostly it lacks next to nothing
+            again = module.solve(tightened(scaled, verdict.point / scaled.unit, _TIGHTER[-1]), **options)
+            other = verdict if again.claim is Claim.INFEASIBLE else judge(scaled, again, within)
+            if other.status.holds:
+                return self._answer(data, backend, scaled.unit, other, again)
+        if verdict.status in _LACKING:
+            scaled, found, verdict = self._elsewhere(scaled, found, verdict, module, within, options)
         if verdict.status in _WORTH_ANOTHER_LOOK and np.all(np.isfinite(verdict.point)):
             by_point = scale(data, verdict.point)
             second = module.solve(by_point, **options)
-            other = judge(by_point, second)
+            other = judge(by_point, second, within)
             if other.rank > verdict.rank:
                 scaled, verdict, found = by_point, other, second
         for factor in _TIGHTER:
             if verdict.status not in _LACKING or not np.all(np.isfinite(verdict.point)):
                 break
             again = module.solve(tightened(scaled, verdict.point / scaled.unit, factor), **options)
-            other = judge(scaled, again)
-            if other.status.holds:
+            other = judge(scaled, again, within)
+            if other.status.holds or other.status is LmiStatus.INFEASIBLE:
                 verdict, found = other, again
+        if verdict.status in _LACKING and np.any(data.cost):  # an objective that runs away hides what is in conflict
+            again = module.solve(replace(scaled, cost=np.zeros_like(scaled.cost)), **options)
+            other = judge(scaled, again, within) if again.claim is Claim.INFEASIBLE else verdict
+            if other.status is LmiStatus.INFEASIBLE:
+                verdict, found = other, again
+        return self._answer(data, backend, natural, verdict, found)
+
+    def _answer(self, data: ConicData, backend: Any, natural: np.ndarray, verdict: Verdict, found: Found) -> LmiAnswer:
         far = np.abs(verdict.point) > _FAR * natural
         return LmiAnswer(
             status=verdict.status,
@@ -186,12 +226,33 @@ class Lmis:
             checks=verdict.checks,
             infeasibility=verdict.infeasibility,
             ray=verdict.ray,
+            least=verdict.least,
             backend=backend if isinstance(backend, str) else getattr(backend, "__name__", repr(backend)),
             iterations=found.iterations,
             seconds=found.seconds,
             claim=found.claim,
-            far=tuple(dict.fromkeys(data.labels[i].split("[")[0] for i in np.flatnonzero(far))),
+            far=tuple(dict.fromkeys(names_of(data)[i] for i in np.flatnonzero(far))),
         )
+
+    def _elsewhere(
+        self, scaled: Scaled, found: Found, verdict: Verdict, module: Any, within: Reach | None, options: dict[str, Any]
+    ) -> tuple[Scaled, Found, Verdict]:
+        """Return the better of an answer that proves nothing and what other scaling, or a deeper ray, makes of it."""
+        try:
+            other = scale(scaled.data, middle=len(scaled.cost) <= _MANY)
+        except SynthesisError:  # a margin drowns in that scaling; the one at hand is what there is
+            return scaled, found, verdict
+        second = module.solve(other, **options)
+        judged = judge(other, second, within)
+        if judged.rank > verdict.rank:
+            scaled, found, verdict = other, second, judged
+        if verdict.status in _LACKING and Claim.UNBOUNDED in (found.claim, second.claim):
+            for tried in (scaled, other):
+                deep = module.solve(ray_data(tried), **options).point[:-1]
+                judged = judge(tried, Found(deep, np.full(len(tried.right), np.nan), Claim.UNBOUNDED), within)
+                if judged.status is LmiStatus.UNBOUNDED:
+                    return tried, found, judged
+        return scaled, found, verdict
 
     def _matrices(self, point: np.ndarray) -> dict[str, np.ndarray]:
         found, start = {}, 0
@@ -201,7 +262,7 @@ class Lmis:
             start += count
         return found
 
-    def _conflict(self, backend: Any, options: dict[str, Any]) -> tuple[str, ...]:
+    def _conflict(self, backend: Any, within: Reach | None, options: dict[str, Any]) -> tuple[str, ...]:
         """Return constraints that are infeasible together, leaving out each that is not needed for it."""
         data = self.data()
         data = replace(data, cost=np.zeros_like(data.cost))
@@ -210,7 +271,7 @@ class Lmis:
             trial = left_out | {name}
             if len(trial) == len(self._constraints):
                 continue
-            if self.attempt(data.without(trial), backend, **options).status is LmiStatus.INFEASIBLE:
+            if self.attempt(data.without(trial), backend, within=within, **options).status is LmiStatus.INFEASIBLE:
                 left_out = trial
         return tuple(name for name in self._constraints if name not in left_out)
 

@@ -53,7 +53,7 @@ class Scaled:
         return self.row * z / self.data.weight / self.price
 
 
-def scale(data: ConicData, around: np.ndarray | None = None) -> Scaled:
+def scale(data: ConicData, around: np.ndarray | None = None, *, middle: bool = False) -> Scaled:
     """Return scaled data.
 
     Parameters
@@ -61,6 +61,8 @@ def scale(data: ConicData, around: np.ndarray | None = None) -> Scaled:
     data : in original units.
     around : (N,), a point: its entries become the units, so that a second look at a poor answer is
         scaled by what the unknowns are, not by what their coefficients suggest.
+    middle : start from factors that bring all entries, not only the largest ones, as near to one as can be (in the
+        mean square of their logarithms): where small coefficients decide, such as the rate of a slow mode.
 
     Raises
     ------
@@ -85,6 +87,8 @@ def scale(data: ConicData, around: np.ndarray | None = None) -> Scaled:
     # Constants have no unit of their own: start from those on the diagonals, the sweeps keep what is near one.
     own = np.where(first == second, offset, 0.0)
     factor = 1 / _largest(first, np.where(single, own, np.sqrt(own)), corners)
+    if middle and not given:
+        factor, unit = _middle(first, second, single, rows, columns, size, offset, factor, unit)
     for _ in range(_SWEEPS):
         row = factor[first] * np.where(single, 1.0, factor[second])
         now, change = size * row[rows], np.ones(1)
@@ -111,6 +115,36 @@ def _largest(positions: np.ndarray, values: np.ndarray, count: int) -> np.ndarra
     found = np.zeros(count)
     np.maximum.at(found, positions, values)
     return np.where(found > 0, found, 1.0)
+
+
+def _middle(
+    first: np.ndarray,
+    second: np.ndarray,
+    single: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    size: np.ndarray,
+    offset: np.ndarray,
+    factor: np.ndarray,
+    unit: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return factors and units with the least sum of squared logarithms of the scaled entries and constants.
+
+    A. R. Curtis, J. K. Reid, 1972, doi:10.1093/imamat/10.1.118, for a matrix; here rows share factors.
+    """
+    some, still = size > 0, np.flatnonzero(offset > 0)
+    row, column = rows[some], columns[some]
+    places = np.concatenate([row, still])
+    number, corners = np.arange(len(places)), len(factor)
+    height, width = len(places), corners + len(unit)
+    ones, twice = np.ones(len(places)), np.where(single[places], 0.0, 1.0)
+    design = sp.csr_matrix((ones, (number, first[places])), shape=(height, width))
+    design = design + sp.csr_matrix((twice, (number, second[places])), shape=(height, width))
+    design = design + sp.csr_matrix((np.ones(len(row)), (number[: len(row)], corners + column)), shape=(height, width))
+    wanted = -np.log(np.concatenate([size[some], offset[still]]))
+    gram = (design.T @ design).toarray() + 1e-9 * np.eye(width)
+    found = np.exp(np.clip(np.linalg.solve(gram, design.T @ wanted), -300.0, 300.0))
+    return found[:corners], found[corners:]
 
 
 def _refuse_hopeless(data: ConicData, row: np.ndarray) -> None:

@@ -13,6 +13,8 @@ from casadi_gnc.synthesis.conic import Kind
 from casadi_gnc.synthesis.scaling import Scaled
 
 REQUIRES = ("clarabel",)
+_LARGE = 100  # unknowns from which a factorisation by blocks is the faster one
+_ENOUGH = 80  # iterations of a large problem: what is not solved by then is polished no further
 _CLAIMS = {
     "Solved": Claim.SOLVED,
     "AlmostSolved": Claim.SOLVED,
@@ -30,7 +32,7 @@ def solve(scaled: Scaled, *, tolerance: float = 1e-10, max_iterations: int = 200
     ----------
     scaled : what to solve. Clarabel's triangles are upper ones column by column, which are ours.
     tolerance : of gap and feasibility, relative and absolute.
-    max_iterations : of the interior point.
+    max_iterations : of the interior point; no more than 80 with more than 100 unknowns.
     """
     clarabel: Any = import_module("clarabel")  # lazily, and it tells type checkers nothing
     cones = {
@@ -44,14 +46,23 @@ def solve(scaled: Scaled, *, tolerance: float = 1e-10, max_iterations: int = 200
     settings.max_iter = max_iterations
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
     count = len(scaled.cost)
-    solution = clarabel.DefaultSolver(
+    if count > _LARGE:
+        settings.direct_solve_method = "faer"
+        settings.max_iter = min(max_iterations, _ENOUGH)
+    solver = clarabel.DefaultSolver(
         sp.csc_matrix((count, count)),
         scaled.cost,
         sp.csc_matrix(-scaled.matrix),
         scaled.right,
         [cones[block.kind](block.size) for block in scaled.data.blocks],
         settings,
-    ).solve()
+    )
+    try:
+        solution = solver.solve()
+    except BaseException as error:  # its eigenvalues may fail on hopeless data: a panic, which is no Exception
+        if type(error).__name__ != "PanicException":
+            raise
+        return Found(np.full(count, np.nan), np.full(len(scaled.right), np.nan), Claim.NOTHING)
     return Found(
         point=np.array(solution.x),
         dual=np.array(solution.z),

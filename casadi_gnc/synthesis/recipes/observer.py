@@ -15,6 +15,7 @@ The error obeys e' = (A - L C) e + (E - L F) w. V = e'Pe and a Schur complement 
 
 which is the dual of state feedback (S. Boyd et al., 1994, section 7.5; there for the plant).
 As there, gamma is held a little above its smallest value while the trace of P is maximised.
+P and H are those of the error in coordinates of `casadi_gnc.synthesis.balancing`, of the dual plant.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import numpy as np
 
 from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
 from casadi_gnc.synthesis.answer import LmiAnswer
+from casadi_gnc.synthesis.balancing import balanced
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, plant_rate
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.recipes.two_steps import two_steps
@@ -52,7 +54,8 @@ def observer(
     A : (n, n). C : (r, n). E : (n, q). F : (r, q). G : (p, n), identity by default.
     gamma : bound on the norm; by default (1 + slack) times the smallest.
     slack : see gamma; positive.
-    margin : of the inequalities, in their units.
+    margin : of the inequalities, in those coordinates; made smaller where it raises the smallest gamma by more than a
+        quarter of slack.
     fastest_rad_s : the error's poles are kept within this distance of zero. Needed where w does not
         disturb all of y: else the gain may run to infinity.
     backend, options : see `casadi_gnc.synthesis.backends`.
@@ -87,12 +90,16 @@ def observer(
     noisy = int(np.linalg.matrix_rank(F))
     missing = f"w disturbs {noisy} of {r} measurements: give the others noise in F, or give fastest_rad_s."
 
-    def pose(lmis: Lmis, gamma: Any) -> Any:
+    inverse = balanced(A.T, C.T, G.T, E.T, F.T).T  # T^-1, of a filter's covariance T^-1 T^-1'
+    T = np.linalg.inv(inverse)
+    a, c, e, g = T @ A @ inverse, C @ inverse, T @ E, G @ inverse
+
+    def pose(lmis: Lmis, gamma: Any, margin: float) -> Any:
         P, H = lmis.symmetric("P", n), lmis.rectangular("H", n, r)
-        moved = P @ A - H @ C
+        moved = P @ a - H @ c
         lmis.psd(P, margin=margin, name="Lyapunov matrix")
         lmis.nsd(
-            block_matrix([[moved + moved.T, P @ E - H @ F, G.T], [-gamma * np.eye(q), 0], [-gamma * np.eye(len(G))]]),
+            block_matrix([[moved + moved.T, P @ e - H @ F, g.T], [-gamma * np.eye(q), 0], [-gamma * np.eye(len(G))]]),
             margin=margin,
             name="bounded real",
         )
@@ -102,7 +109,7 @@ def observer(
         return P
 
     def gains_of(answer: LmiAnswer, promised: float) -> Synthesis:
-        L = np.linalg.solve(answer["P"], answer["H"])
+        L = inverse @ np.linalg.solve(answer["P"], answer["H"])
         norm = h_infinity_norm(A - L @ C, E - L @ F, G)
         return certify_gains(
             {"L": L},
@@ -114,4 +121,4 @@ def observer(
             missing=missing if noisy < r else "Give fastest_rad_s.",
         )
 
-    return two_steps(pose, gains_of, gamma, slack, backend, options)
+    return two_steps(pose, gains_of, gamma, slack, margin, backend, options)

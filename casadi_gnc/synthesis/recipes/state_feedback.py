@@ -17,6 +17,7 @@ Schur complement, the bounded-real inequality in X, W and gamma
 smallest gamma the gain is seldom unique and often infinite. So gamma is then held a little above, and
 the trace of X maximised: where D'D > 0 and F = 0, P = gamma X^-1 is then the stabilising solution of the
 Riccati equation A'P + P A + C'C - (P B + C'D)(D'D)^-1 (B'P + D'C) + P E E'P / gamma^2 = 0.
+X and W are those of the state in coordinates of `casadi_gnc.synthesis.balancing`, whatever the units of x are.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ import numpy as np
 
 from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
 from casadi_gnc.synthesis.answer import LmiAnswer
+from casadi_gnc.synthesis.balancing import balanced
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.recipes.two_steps import two_steps
@@ -57,7 +59,8 @@ def state_feedback(
     A : (n, n). B : (n, m). E : (n, q). C : (p, n). D : (p, m). F : (p, q), zero by default.
     gamma : bound on the norm; by default (1 + slack) times the smallest.
     slack : see gamma; positive.
-    margin : of the inequalities, in their units.
+    margin : of the inequalities, in those coordinates; made smaller where it raises the smallest gamma by more than a
+        quarter of slack.
     fastest_rad_s : the closed loop's poles are kept within this distance of zero. Needed where z does
         not hold all of u: else the gain may run to infinity.
     vertices : (V, n), starts from whose hull the peak of the norm of u is simulated; see `box_vertices`.
@@ -96,12 +99,16 @@ def state_feedback(
     priced = int(np.linalg.matrix_rank(D))
     missing = f"z prices {priced} of {m} commands: add rows with the others to D, or give fastest_rad_s."
 
-    def pose(lmis: Lmis, gamma: Any) -> Any:
+    T = balanced(A, B, E, C, D)
+    inverse = np.linalg.inv(T)
+    a, b, e, c = T @ A @ inverse, T @ B, T @ E, C @ inverse
+
+    def pose(lmis: Lmis, gamma: Any, margin: float) -> Any:
         X, W = lmis.symmetric("X", n), lmis.rectangular("W", m, n)
-        moved = A @ X - B @ W
+        moved = a @ X - b @ W
         lmis.psd(X, margin=margin, name="Lyapunov matrix")
         lmis.nsd(
-            block_matrix([[moved + moved.T, E, (C @ X - D @ W).T], [-gamma * np.eye(q), F.T], [-gamma * np.eye(p)]]),
+            block_matrix([[moved + moved.T, e, (c @ X - D @ W).T], [-gamma * np.eye(q), F.T], [-gamma * np.eye(p)]]),
             margin=margin,
             name="bounded real",
         )
@@ -111,7 +118,7 @@ def state_feedback(
         return X
 
     def gains_of(answer: LmiAnswer, promised: float) -> Synthesis:
-        K = np.linalg.solve(answer["X"], answer["W"].T).T
+        K = np.linalg.solve(answer["X"], answer["W"].T).T @ T
         norm = h_infinity_norm(A - B @ K, E, C - D @ K, F)
         return certify_gains(
             {"K": K},
@@ -126,4 +133,4 @@ def state_feedback(
             missing=missing if priced < m else "Give fastest_rad_s.",
         )
 
-    return two_steps(pose, gains_of, gamma, slack, backend, options)
+    return two_steps(pose, gains_of, gamma, slack, margin, backend, options)
