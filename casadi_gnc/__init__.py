@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from casadi_gnc.missions.requirements import Requirement, Verdict
     from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
     from casadi_gnc.missions.timing import Noise, Timing
-    from casadi_gnc.problem_files.by_name import check, fly, fly_all
+    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all
     from casadi_gnc.problem_files.document import shipped
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.signals import Layout, Signal
@@ -64,6 +64,7 @@ _HOMES = {
     "TORQUE": "laws",
     "Timing": "missions.timing",
     "Verdict": "missions.requirements",
+    "campaign": "problem_files.by_name",
     "check": "problem_files.by_name",
     "fly": "problem_files.by_name",
     "fly_all": "problem_files.by_name",
@@ -103,6 +104,7 @@ __all__ = [
     "StepStatus",
     "Timing",
     "Verdict",
+    "campaign",
     "check",
     "fly",
     "fly_all",

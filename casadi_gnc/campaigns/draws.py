@@ -38,6 +38,7 @@ class Purpose(IntEnum):
     CHAINS = 3
     LINES = 4
     AUDIT = 5
+    NOISE = 6
 
 
 def check_seed(seed: int) -> int:

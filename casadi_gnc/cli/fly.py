@@ -41,6 +41,9 @@ def fly(
     ] = MathChoice.gnc,
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the file's own mode.")] = None,
     decimation: Annotated[int | None, typer.Option(min=1, help="Keep every so many-th sample.")] = None,
+    case: Annotated[
+        str | None, typer.Option(help="Of a campaign's folder: a number, worst:METRIC, best:METRIC or median:METRIC.")
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
@@ -51,6 +54,9 @@ def fly(
     from casadi_gnc.problem_files.sweeping import load_sweeps
     from casadi_gnc.system.files import prepare_folder
 
+    if case is not None:
+        _fly_case(Path(problem), case, out, decimation, plots, json)
+        return
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)
@@ -77,6 +83,29 @@ def fly(
     else:
         _print(mission, flights, written)
     if any(flight.diverged for flight in flights):
+        raise typer.Exit(1)
+
+
+def _fly_case(campaign: Path, case: str, out: Path | None, decimation: int | None, plots: bool, json: bool) -> None:
+    """Fly one case of a campaign again, word for word, and write it as any flight."""
+    from casadi_gnc.missions import flight as results
+    from casadi_gnc.problem_files.by_name import open_campaign
+    from casadi_gnc.system.files import prepare_folder
+
+    found = open_campaign(campaign).case(case)
+    mission = found.cases.varied.nominal
+    folder = prepare_folder(Path("out") / f"{mission.name}-case-{found.number}" if out is None else out)
+    with _Progress(f"case {found.number}", quiet=json) as progress:
+        flight = found.fly(decimation=decimation, progress=progress)
+    written = [flight.save(folder), results.save_summary(folder, [flight])]
+    if plots:
+        written += _draw(mission, [flight], folder)
+    if json:
+        typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
+    else:
+        typer.echo(f"case {found.number}")
+        _print(mission, [flight], written)
+    if flight.diverged:
         raise typer.Exit(1)
 
 

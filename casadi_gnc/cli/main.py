@@ -12,6 +12,7 @@ from casadi_gnc.cli import (
     allocate,
     attainable,
     bench,
+    campaign,
     catalogue,
     check,
     doctor,
@@ -35,6 +36,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 app.command("fly")(fly.fly)
+app.command("campaign")(campaign.campaign)
 app.command("check")(check.check)
 app.command("allocate")(allocate.allocate)
 app.command("attainable")(attainable.attainable)

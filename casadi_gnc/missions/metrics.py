@@ -114,22 +114,34 @@ def read(
     None stands for "never" (a settling, a reaching), "nowhere" (an empty window), and for every metric of a
     flight that diverged: comparisons pass over what is not a number, so nothing can be said.
     """
-    values: dict[str, float | None] = {}
-    diverged = StepStatus.DIVERGED in statuses(layout, tally)
+    found = read_many(metrics, layout, tally[None, :], last, period)
+    return {name: None if math.isnan(column[0]) else float(column[0]) for name, column in found.items()}
+
+
+def read_many(
+    metrics: Sequence[Metric], layout: Layout, tallies: np.ndarray, last: float, period: float
+) -> dict[str, np.ndarray]:
+    """Return the values of the metrics of many flights, (flights,) each, NaN in the place of None; else as `read`.
+
+    Parameters
+    ----------
+    tallies : (flights, columns).
+    """
+    values: dict[str, np.ndarray] = {}
+    diverged = tallies[:, layout.place(f"count_{StepStatus.DIVERGED.name}")][:, 0] > 0
     for metric in metrics:
-        value = float(tally[layout.place(_column(metric))][0])
-        nowhere = metric.kind != "settling" and value < 0
-        if diverged or not math.isfinite(value) or nowhere:
-            values[metric.name] = None
-        elif metric.kind == "settling":
+        value = tallies[:, layout.place(_column(metric))][:, 0].copy()
+        value[diverged | ~np.isfinite(value)] = math.nan
+        if metric.kind == "settling":
             # The signal was above its threshold at `value` for the last time, or never.
-            settled = value + period if value >= 0 else 0.0
-            values[metric.name] = settled if value < last else None
-        elif metric.kind == "mean":
-            count = _samples_within(metric, last, period)
-            values[metric.name] = value / count if count else None
+            value = np.where(value >= 0, value + period, np.where(np.isnan(value), math.nan, 0.0))
+            value[value >= last] = math.nan
         else:
-            values[metric.name] = value
+            value[value < 0] = math.nan
+            if metric.kind == "mean":
+                count = _samples_within(metric, last, period)
+                value = value / count if count else np.full(len(value), math.nan)
+        values[metric.name] = value
     return values
 
 

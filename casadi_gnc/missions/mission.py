@@ -55,6 +55,7 @@ class Mission:
     start_from : states that begin otherwise than the craft says, by signal.
     checks : functions (mission, scheme) that yield further checks of this mission.
     parts : of the craft, where it has been asked for them.
+    dispersions : what differs from case to case of a campaign (`casadi_gnc.campaigns.cases.Dispersion`).
     origin : the file that it was read from, if it was; `dataclasses.replace`, which may change anything, forgets it.
 
     Raises
@@ -84,6 +85,7 @@ class Mission:
     start_from: Mapping[str, Sequence[float]] = field(default_factory=dict)
     checks: Sequence[Callable[[Mission, Scheme], Iterable[Check]]] = ()
     requirements: Sequence[Requirement] = ()
+    dispersions: Sequence[Any] = ()
     parts: InitVar[Parts | None] = None
     origin: Origin | None = field(default=None, init=False)
 

@@ -84,6 +84,49 @@ class Varied:
         """The scheme, with symbols."""
         return self.mission.schemes[0]
 
+    @cached_property
+    def _believable(self) -> ca.Function:
+        """The function from the parameters to the true inertias, (9 k,), and the first perfect measurement."""
+        plant, p = self.mission.truth, self.parameters.symbols
+        inertias = [ca.vec(ca.SX(array(inertia))) for inertia in plant.inertias().values()]
+        seen = plant.measure(0.0, ca.vertcat(*self.mission.start), self.mission.quiet())
+        return ca.Function("believable", [p], [ca.densify(ca.vertcat(*inertias, ca.SX(0, 1))), ca.densify(ca.SX(seen))])
+
+    def refusals(self, values: np.ndarray) -> list[str]:
+        """Return for each row of values why no such craft can fly, "" where it can.
+
+        Looked at are the ranges and rules of the file's keys and of the gains, the true inertias (positive definite)
+        and the first measurement (one that the sensors can tell).
+
+        Parameters
+        ----------
+        values : (cases, P).
+        """
+        told = [self._refusal(row) for row in values]
+        if not len(values):
+            return told
+        inertias, seen = (np.array(each).T.reshape(len(values), -1) for each in self._believable(values.T))
+        layout = self.mission.truth.measurement
+        limits = np.concatenate([np.full(s.size, s.limit) for s in layout.signals] or [np.zeros(0)])
+        bodies = inertias.reshape(len(values), -1, 3, 3)
+        for i in range(len(values)):
+            if told[i]:
+                continue
+            if not np.isfinite(bodies[i]).all() or not (np.linalg.eigvalsh(bodies[i]) > 0).all():
+                told[i] = "the true inertia is not positive definite"
+            elif not (np.abs(seen[i]) <= limits).all():
+                row = int(np.flatnonzero(~(np.abs(seen[i]) <= limits))[0])
+                name = next(s.name for s in layout.signals if layout.place(s.name).stop > row)
+                told[i] = f"{name} starts at {seen[i][row]:g}, beyond the largest credible, {limits[row]:g}"
+        return told
+
+    def _refusal(self, values: np.ndarray) -> str:
+        try:
+            _changed(self.nominal, dict(zip(self.parameters.keys, map(float, values), strict=True)))
+        except GncError as error:
+            return str(error)
+        return ""
+
     def at(self, values: Sequence[float] | np.ndarray) -> Mission:
         """Return the mission with these values of the parameters as numbers, checked as a file's would be.
 
@@ -220,24 +263,31 @@ def _at(mission: Mission, key: str) -> float:
 
 def _with(mission: Mission, values: dict[str, Any]) -> Mission:
     """Return a mission with other numbers, or symbols, at whole paths."""
-    craft, laws = mission.craft, {each.name: each.law for each in mission.schemes}
-    of_craft = {_of_craft(key): value for key, value in values.items() if not key.startswith("scheme.")}
-    if of_craft:
-        craft = _rebuilt(craft, of_craft)
+    craft, laws = _changed(mission, values)
     parts = Parts(craft)
+    schemes = []
     for each in mission.schemes:
-        own = {
-            tuple(key.split(".")[3:]): value for key, value in values.items() if key.startswith(f"scheme.{each.name}.")
-        }
+        law = laws[each.name]
+        if craft is not mission.craft and each.keys is not None and law.belief_kind() is not None:
+            law = replace(law, body=parts.belief)
+        schemes.append(replace(each, law=law, actuation=_actuation(each, parts)))
+    return replace(mission, craft=craft, schemes=schemes, parts=parts)
+
+
+def _changed(mission: Mission, values: dict[str, Any]) -> tuple[Craft, dict[str, Law]]:
+    """Return craft and laws with other numbers, which are validated, or with symbols, which nothing validates."""
+    of_craft = {_of_craft(key): value for key, value in values.items() if not key.startswith("scheme.")}
+    craft = _put(mission.craft, of_craft) if of_craft else mission.craft
+    laws = {}
+    for each in mission.schemes:
+        start = f"scheme.{each.name}."
+        own = {tuple(key.split(".")[3:]): value for key, value in values.items() if key.startswith(start)}
         gains = {
             name: _put(getattr(each.law, name), {path[1:]: value for path, value in own.items() if path[0] == name})
             for name in dict.fromkeys(path[0] for path in own)
         }
-        if of_craft and each.keys is not None and each.law.belief_kind() is not None:
-            gains["body"] = parts.belief
         laws[each.name] = replace(each.law, **gains) if gains else each.law
-    schemes = [replace(each, law=laws[each.name], actuation=_actuation(each, parts)) for each in mission.schemes]
-    return replace(mission, craft=craft, schemes=schemes, parts=parts)
+    return craft, laws
 
 
 def _of_craft(key: str) -> Path:
@@ -253,11 +303,6 @@ def _actuation(scheme: Scheme, parts: Parts) -> Any:
         return parts.actuation(scheme.keys)
     except (GncError, MisfitError) as error:
         raise FlightError(f"the actuators as the flight software knows them follow from it ({error})") from error
-
-
-def _rebuilt(craft: Craft, values: dict[Path, Any]) -> Craft:
-    """Return a craft with other numbers, validated; or with symbols, which nothing validates."""
-    return _put(craft, values)
 
 
 def _put(at: Any, values: dict[Path, Any]) -> Any:

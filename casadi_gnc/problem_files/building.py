@@ -79,6 +79,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
             title=common.title,
             source=common.source,
             checks=further,
+            dispersions=common.dispersion,
             parts=parts,
         )
     complaints.settle()

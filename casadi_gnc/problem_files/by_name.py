@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from casadi_gnc import checking
 from casadi_gnc.checks import Check
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import CampaignError, ProblemError
 from casadi_gnc.missions import flying
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files.loading import load
+
+if TYPE_CHECKING:
+    from casadi_gnc.campaigns.result import Campaign
 
 
 def mission_of(problem: Any, *, strict: bool = True) -> Mission:
@@ -63,3 +67,47 @@ def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Chec
     ['note', 'ok']
     """
     return checking.check(mission_of(problem, strict=False), scheme)
+
+
+def campaign(problem: str | Path | Mission, flights: int, **options: Any) -> Campaign:
+    """Fly many cases of a mission, which may be given by the name of its file, and keep a row of each.
+
+    Parameters
+    ----------
+    problem : a mission, a problem file, or the name of a shipped one.
+    flights : number of cases.
+    options : as for `casadi_gnc.campaigns.campaign.campaign`: scheme, dispersions, plan, seed, out, shard, audit.
+
+    Examples
+    --------
+    >>> from casadi_gnc.campaigns import DispersionTable
+    >>> inertia = DispersionTable(key="truth.inertia_factor", normal={"mean": 1.0, "deviation": 0.03, "truncate": 3.0})
+    >>> found = campaign("huang2020/detumble", 32, scheme="observer_pinv", dispersions=[inertia])
+    >>> len(found), found.worst("settling_time").fly()["rate"].shape
+    (32, (15001, 3))
+    """
+    from casadi_gnc.campaigns.campaign import campaign as flown
+
+    return flown(mission_of(problem), flights, **options)
+
+
+def open_campaign(folder: str | Path) -> Campaign:
+    """Return a campaign that is kept in a folder, finished or not.
+
+    Raises
+    ------
+    CampaignError
+        For a folder without campaign, or one of a mission that was made from objects, whose code is not in the folder.
+    """
+    from casadi_gnc.campaigns.campaign import opened
+    from casadi_gnc.campaigns.store import read_identity
+
+    place = Path(folder)
+    identity = read_identity(place)
+    if not (place / "problem.toml").exists():
+        raise CampaignError(
+            f"{place} is a campaign of a mission that was made from objects; run it again in Python, with "
+            f"out={str(folder)!r}"
+        )
+    read = load(place / "problem.toml", identity["changes"], strict=False)
+    return opened(replace(read, name=identity["mission"]).read_from(read.origin), place)

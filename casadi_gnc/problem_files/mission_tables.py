@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
+from casadi_gnc.campaigns.dispersions import DispersionTable
 from casadi_gnc.errors import RequirementError
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.requirements.requirement import ID
@@ -169,6 +170,7 @@ class MissionTables(Part):
     metric: list[MetricTable] = []
     requirement: list[RequirementTable] = []
     sweep: list[SweepTable] = []
+    dispersion: list[DispersionTable] = Field(default=[], description="what differs from case to case of a campaign")
     checks: list[str] = Field(default=[], description='further checks: names, or "./file.py:function"')
 
     @field_validator("funnel", mode="before")

@@ -1,0 +1,252 @@
+"""Fly a campaign: draw cases, fly them shard by shard, keep their rows, look at some again."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tempfile
+from collections.abc import Callable, Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.campaigns.cases import Cases, Dispersion, Drawn, cases_of
+from casadi_gnc.campaigns.dispersions import DispersionTable
+from casadi_gnc.campaigns.draws import Purpose, check_seed, words
+from casadi_gnc.campaigns.engines import CompiledBatch, Flown
+from casadi_gnc.campaigns.plan import Plan
+from casadi_gnc.campaigns.result import Campaign
+from casadi_gnc.campaigns.store import Columns, Store, has_arrow, keep_texts, read_identity, shards
+from casadi_gnc.embedded.printer import Math
+from casadi_gnc.errors import CampaignError
+from casadi_gnc.missions import metrics
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.origin import Origin
+from casadi_gnc.status import StepStatus
+
+#: Samples of a shard, about: seconds of one core.
+_SHARD_SAMPLES = 3e7
+#: Called as told(cases done, cases in all).
+Told = Callable[[int, int], None]
+
+
+def campaign(
+    mission: Mission,
+    flights: int,
+    *,
+    scheme: str | None = None,
+    dispersions: Sequence[Dispersion] | None = None,
+    plan: str | Plan = "independent",
+    seed: int = 0,
+    out: str | Path | None = None,
+    shard: tuple[int, int] = (1, 1),
+    audit: int = 3,
+    maths: Math = "gnc",
+    vectors: str | None = None,
+    threads: int | None = None,
+    told: Told | None = None,
+) -> Campaign:
+    """Fly many cases of a mission and keep a row of each.
+
+    A case is a function of the mission, the plan, the seed and its number. Cases that are in the folder already are
+    not flown again, so that an interrupted campaign goes on where it was.
+
+    Parameters
+    ----------
+    mission : what is flown.
+    flights : number of cases.
+    scheme : its name; the first by default.
+    dispersions : what varies; those of the mission by default.
+    plan : how the cases fill the space of what varies, by name or as a plan.
+    seed : 0 to 2^64 - 1.
+    out : folder of the rows; a temporary one by default, gone with the result.
+    shard : (i, n), fly the i-th of n parts only: several machines fill one folder.
+    audit : so many cases of each shard are flown again one by one in scalar C, and must have the same words.
+    maths, vectors, threads : as for `casadi_gnc.campaigns.engines.CompiledBatch`.
+    told : called as cases are done.
+
+    Raises
+    ------
+    GncError
+        For what cannot be flown or dispersed, a folder with another campaign, or an audit that finds other words.
+    """
+    if not 1 <= flights <= 2**32:
+        raise CampaignError(f"{flights} flights are asked for; expected 1 to 2^32")
+    if not 1 <= shard[0] <= shard[1]:
+        raise CampaignError(f"the shard is {shard[0]}/{shard[1]}; expected i/n with 1 <= i <= n")
+    varying = mission.dispersions if dispersions is None else dispersions
+    cases = cases_of(mission, varying, plan, flights, check_seed(seed), scheme)
+    flown = cases.varied.nominal
+    if not varying and not flown.truth.noise.size:
+        raise CampaignError(
+            f"nothing differs from case to case: {mission.name} has neither a [[dispersion]] nor noise; add one"
+        )
+    temporary = tempfile.TemporaryDirectory(prefix="casadi-gnc-campaign-") if out is None else None
+    folder = Path(temporary.name if temporary else out or "")
+    store = Store(folder, _identity(cases, flights, varying, plan, maths))
+    if flown.origin is not None:
+        keep_texts(folder, _texts(flown.origin, varying))
+    _fly_missing(cases, store, shard, audit, maths, vectors, threads, told)
+    return Campaign(folder, cases, temporary)
+
+
+def opened(mission: Mission, folder: Path) -> Campaign:
+    """Return the campaign of a mission that is kept in a folder, with its cases; nothing is flown.
+
+    Raises
+    ------
+    CampaignError
+        Where its plan or what varies was an object of Python's, so that the folder does not say what it was.
+    """
+    identity = read_identity(folder)
+    if identity["dispersions"] is None or identity["plan_name"] is None:
+        what = "plan" if identity["plan_name"] is None else "dispersions"
+        raise CampaignError(f"{folder}: its {what} came from Python and not from a file; run it again there to open it")
+    varying = [DispersionTable(**table) for table in identity["dispersions"]]
+    origin = mission.origin
+    here = mission if origin is None else mission.read_from(dataclasses.replace(origin, folder=folder))
+    cases = cases_of(here, varying, identity["plan_name"], identity["cases"], identity["seed"], identity["scheme"])
+    if cases.varied.nominal.digest != identity["problem_sha256"]:
+        raise CampaignError(f"{folder / 'problem.toml'} is not what was flown: it was changed since")
+    return Campaign(folder, cases)
+
+
+def _texts(origin: Origin, dispersions: Sequence[Any]) -> dict[str, str]:
+    """Return the files that the mission was read from, and the tables of what varies."""
+    files = [each.table.file for each in dispersions if getattr(each, "table", None) is not None]
+    tables = {name: (origin.folder / name).read_text(encoding="utf-8") for name in files}
+    return {"problem.toml": origin.text, **{file.path: file.text for file in origin.guests}, **tables}
+
+
+def _fly_missing(
+    cases: Cases,
+    store: Store,
+    shard: tuple[int, int],
+    audit: int,
+    maths: Math,
+    vectors: str | None,
+    threads: int | None,
+    told: Told | None,
+) -> None:
+    mine = [each for each in shards(store.identity) if each[0] % shard[1] == shard[0] - 1]
+    total = sum(last - first for _, first, last in mine)
+    missing = [each for each in mine if store.state(each[0]) != "whole"]
+    done = total - sum(last - first for _, first, last in missing)
+    if told:
+        told(done, total)
+    if not missing:
+        return
+    batch = CompiledBatch(cases.varied, maths, vectors=vectors, threads=threads)
+    for number, first, last in missing:
+        drawn = cases.draw(first, last)
+        good = np.array([not why for why in drawn.refused])
+        if number == 0 and not good.any():
+            raise CampaignError(f"every case is refused; the first: {drawn.refused[0]}")
+        begun = done
+
+        def counted(count: int, begun: int = begun) -> None:
+            nonlocal done
+            done += count
+            if told:
+                told(done, total)
+
+        flights = batch.fly(drawn.values[good], drawn.seeds[good], counted)
+        _audit(cases, drawn, good, flights, audit, maths)
+        store.write(number, _rows(cases, drawn, good, flights))
+        done = begun + last - first
+        if told:
+            told(done, total)
+
+
+def _audit(cases: Cases, drawn: Drawn, good: np.ndarray, flights: Flown, count: int, maths: Math) -> None:
+    """Fly some cases again in scalar C, and compare all words."""
+    flown = np.flatnonzero(good)
+    if not count or not len(flown):
+        return
+    picks = words(cases.seed, Purpose.AUDIT, drawn.numbers[:1], count)[0] % np.uint64(len(flown))
+    chosen = np.unique(picks.astype(int))
+    alone = CompiledBatch(cases.varied, maths, vectors="none", threads=1)
+    again = alone.fly(drawn.values[flown[chosen]], drawn.seeds[flown[chosen]])
+    apart = (again.words != flights.words[chosen]).any(axis=1)
+    if apart.any():
+        number = int(drawn.numbers[flown[chosen[np.flatnonzero(apart)[0]]]])
+        raise CampaignError(
+            f"case {number} has other words when it is flown again in scalar C: the compiler has not kept the "
+            "arithmetic; nothing of its shard was kept. Take another compiler (CC=...), and tell its version"
+        )
+
+
+def _rows(cases: Cases, drawn: Drawn, good: np.ndarray, flights: Flown) -> Columns:
+    """Return the table of some cases: parameters, metrics, statuses; nothing but the former of those refused."""
+    mission, tapes = cases.varied.nominal, cases.varied.tapes
+    count = len(drawn.numbers)
+    columns: Columns = {"case": drawn.numbers.astype(np.int64), "noise_seed": drawn.seeds, "weight": drawn.weights}
+    columns |= {key: drawn.values[:, i] for i, key in enumerate(cases.varied.parameters.keys)}
+    columns["refused"] = np.array(drawn.refused, dtype=object if has_arrow() else str)
+    period, last = mission.timing.sample_period, (mission.timing.samples - 1) * mission.timing.sample_period
+    values = metrics.read_many(tuple(mission.metrics), tapes.tally, flights.tally, last, period)
+    for name, numbers in values.items():
+        columns[f"metric.{name}"] = _spread(numbers, good, math.nan)
+    for bit in StepStatus:
+        raised = flights.tally[:, tapes.tally.place(f"count_{bit.name}")][:, 0]
+        first = flights.tally[:, tapes.tally.place(f"first_{bit.name}")][:, 0]
+        columns[f"samples.{bit.name}"] = _spread(raised, good, 0.0).astype(np.int64)
+        columns[f"first.{bit.name}"] = _spread(np.where(raised > 0, first, math.nan), good, math.nan)
+    assert all(len(column) == count for column in columns.values())
+    return columns
+
+
+def _spread(numbers: np.ndarray, good: np.ndarray, otherwise: float) -> np.ndarray:
+    column = np.full(len(good), otherwise)
+    column[good] = numbers
+    return column
+
+
+def shard_size(samples: int) -> int:
+    """Return how many flights of so many samples make a shard: a power of two, the same on every machine."""
+    return 2 ** max(4, min(16, round(math.log2(_SHARD_SAMPLES / samples))))
+
+
+def _identity(cases: Cases, flights: int, dispersions: Sequence[Any], plan: str | Plan, maths: Math) -> dict[str, Any]:
+    mission = cases.varied.nominal
+    return {
+        "format": 1,
+        "mission": mission.name,
+        "problem_sha256": mission.digest,
+        "changes": dict(mission.origin.changes) if mission.origin else None,
+        "scheme": cases.varied.scheme.name,
+        "mode": mission.timing.mode,
+        "maths": maths,
+        "seed": cases.seed,
+        "plan": repr(cases.plan),
+        "plan_name": plan if isinstance(plan, str) else None,
+        "parameters": list(cases.varied.parameters.keys),
+        "dispersions": _tables(dispersions),
+        "distributions": [_told(each) for each in cases.distributions],
+        "cases": flights,
+        "shard": shard_size(mission.timing.samples),
+        "table": "parquet" if has_arrow() else "npz",
+        "casadi_gnc": metadata.version("casadi-gnc"),
+        "casadi": metadata.version("casadi"),
+    }
+
+
+def _tables(dispersions: Sequence[Any]) -> list[dict[str, Any]] | None:
+    """Return what varies as a file says it; None where it is an object of another kind."""
+    if not all(isinstance(each, DispersionTable) for each in dispersions):
+        return None
+    return [each.model_dump(exclude_none=True, exclude_defaults=True) for each in dispersions]
+
+
+def _told(distribution: Any) -> str:
+    return repr(distribution) if dataclasses.is_dataclass(distribution) else type(distribution).__qualname__
+
+
+def parts_of(text: str) -> tuple[int, int]:
+    """Return (i, n) of "i/n"; raise `CampaignError` for another text."""
+    first, _, second = text.partition("/")
+    if not (first.isdecimal() and second.isdecimal()):
+        raise CampaignError(f"the shard is {text!r}; expected i/n, such as 3/40")
+    return int(first), int(second)

@@ -1,0 +1,154 @@
+"""What a campaign came to: its table, its worst cases, and each case flown again on demand."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.campaigns.cases import Cases
+from casadi_gnc.campaigns.store import Columns, Store, read_identity, shards
+from casadi_gnc.campaigns.summary import badness, summarised
+from casadi_gnc.errors import CampaignError
+from casadi_gnc.missions.flight import Flight
+from casadi_gnc.missions.flying import fly_case
+from casadi_gnc.missions.scheme import Metric
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Name one case of a campaign, and fly it again: word for word what was flown."""
+
+    number: int
+    row: dict[str, Any] = field(repr=False)
+    cases: Cases = field(repr=False)
+
+    def fly(self, **options: Any) -> Flight:
+        """Fly the case with its whole record; options as for `casadi_gnc.missions.flying.fly_case`."""
+        drawn = self.cases.draw(self.number, self.number + 1)
+        if drawn.refused[0]:
+            raise CampaignError(f"case {self.number} is refused: {drawn.refused[0]}")
+        return fly_case(self.cases.varied, drawn.values[0], int(drawn.seeds[0]), **options)
+
+
+class Campaign:
+    """Read what is kept of a campaign.
+
+    Columns of the table: `case`, `noise_seed`, `weight`, each parameter by its key, `refused` (why, "" for a case
+    that flew), `metric.NAME` (NaN for none), `samples.STATUS` and `first.STATUS` (how many samples raised a status and
+    when first [s]).
+    """
+
+    def __init__(self, folder: Path, cases: Cases, temporary: tempfile.TemporaryDirectory[str] | None = None) -> None:
+        self.folder, self.cases, self._temporary = folder, cases, temporary
+        self.identity = read_identity(folder)
+        self._store = Store(folder, self.identity)
+        self._kept: Columns = {}
+
+    def __len__(self) -> int:
+        return len(self.column("case"))
+
+    def __repr__(self) -> str:
+        told = f"{len(self)} of {self.identity['cases']} cases"
+        return f"Campaign({self.identity['mission']}, {self.identity['scheme']}: {told})"
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """What was asked of every flight."""
+        return tuple(self.cases.varied.nominal.metrics)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of all columns."""
+        return list(self._store.read(self._whole()[0], None))
+
+    def _whole(self) -> list[int]:
+        found = [number for number, _, _ in shards(self.identity) if self._store.state(number) == "whole"]
+        if not found:
+            raise CampaignError(f"{str(self.folder)!r} holds no finished shard yet; run the campaign")
+        return found
+
+    def column(self, name: str) -> np.ndarray:
+        """Return a column of all cases that are kept, in their order."""
+        if name not in self._kept:
+            known = self.names
+            if name not in known:
+                raise CampaignError(f"the table has no column {name!r}; it has {', '.join(known)}")
+            self._kept[name] = np.concatenate([self._store.read(number, [name])[name] for number in self._whole()])
+        return self._kept[name]
+
+    def columns(self, names: Sequence[str]) -> np.ndarray:
+        """Return some columns side by side, (cases, columns)."""
+        return np.column_stack([self.column(name) for name in names]) if names else np.empty((len(self), 0))
+
+    @property
+    def table(self) -> Any:
+        """The whole table: of pyarrow where it is installed, else columns by name."""
+        columns = {name: self.column(name) for name in self.names}
+        if self._store.suffix == "npz":
+            return columns
+        import pyarrow as pa
+
+        return pa.table(columns)
+
+    def to_pandas(self) -> Any:
+        """Return the table as a pandas data frame; pandas must be installed."""
+        import pandas as pd  # type: ignore[import-not-found]
+
+        return pd.DataFrame({name: self.column(name) for name in self.names})
+
+    def ranked(self, metric: str) -> np.ndarray:
+        """Return the numbers of the cases that flew, the worst first.
+
+        The worst is the largest value, of a `least` the smallest; a flight without a value (it never settled, it
+        diverged) is worse than all that have one.
+        """
+        asked = self._metric(metric)
+        flew = self.flew
+        values = badness(asked, self.column(f"metric.{metric}")[flew])
+        return self.column("case")[flew][np.argsort(-values, kind="stable")]
+
+    @property
+    def flew(self) -> np.ndarray:
+        """Which cases were not refused, (cases,)."""
+        return self.column("refused") == ""
+
+    def _metric(self, name: str) -> Metric:
+        for metric in self.metrics:
+            if metric.name == name:
+                return metric
+        known = ", ".join(metric.name for metric in self.metrics) or "none"
+        raise CampaignError(f"the mission has no metric {name!r}; there is {known}")
+
+    def worst(self, metric: str) -> Case:
+        """Return the worst case of a metric."""
+        return self.case(f"worst:{metric}")
+
+    def case(self, told: int | str) -> Case:
+        """Return a case by its number, or as "worst:METRIC", "best:METRIC" or "median:METRIC", "refused:N"."""
+        number = self._number(str(told))
+        place = np.flatnonzero(self.column("case") == number)
+        if not len(place):
+            raise CampaignError(f"case {number} is not kept; there are cases 0 to {self.identity['cases'] - 1}")
+        row = {name: self.column(name)[place[0]].item() for name in self.names if name != "refused"}
+        return Case(number, row, self.cases)
+
+    def _number(self, told: str) -> int:
+        if told.isdecimal():
+            return int(told)
+        how, _, metric = told.partition(":")
+        if how not in ("worst", "best", "median") or not metric:
+            raise CampaignError(f"no case {told!r}; expected its number, worst:METRIC, best:METRIC or median:METRIC")
+        ranked = self.ranked(metric)
+        if not len(ranked):
+            raise CampaignError("no case flew: all are refused")
+        place = {"worst": 0, "best": len(ranked) - 1, "median": len(ranked) // 2}[how]
+        return int(ranked[place])
+
+    def summary(self, confidence: float = 0.9) -> dict[str, Any]:
+        """Return what the flights tell, with bounds: metrics, statuses, what drives them, the worst cases."""
+        return summarised(self, confidence)

@@ -1,0 +1,171 @@
+"""Where a campaign is kept: a file for each shard of its cases, and what it is a campaign of.
+
+=======================  ==================================================================================
+file                     content
+=======================  ==================================================================================
+campaign.json            identity: mission, scheme, plan, seed, dispersions, code and versions; number of cases
+problem.toml, *.py       what the mission was read from, where it was read
+shard-00000.parquet      a row a case, in order (`.npz` without pyarrow)
+shard-00000.json         cases of the shard and the hash of its file; written last, so that it stands for a whole one
+=======================  ==================================================================================
+
+A file is written beside its place, brought to the disk and renamed; whoever is interrupted leaves whole files or none.
+Shards depend on nothing but the campaign, so several processes may write into one folder, and the next run goes on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.errors import CampaignError
+from casadi_gnc.system.files import prepare_folder, write_beside
+
+IDENTITY = "campaign.json"
+#: A table: columns by name, of one length.
+Columns = dict[str, np.ndarray]
+
+
+def has_arrow() -> bool:
+    """Return whether pyarrow is installed, so that tables are Parquet files."""
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+class Store:
+    """Keep the shards of one campaign in a folder.
+
+    Parameters
+    ----------
+    folder : made if it does not exist.
+    identity : of the campaign, data that JSON can hold; `cases` and `shard` are the numbers of cases in all and in
+        a shard.
+
+    Raises
+    ------
+    CampaignError
+        Where the folder holds another campaign.
+    """
+
+    def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
+        self.folder = prepare_folder(folder)
+        self.identity = identity
+        place = folder / IDENTITY
+        if place.exists():
+            known = read_identity(folder)
+            apart = [name for name in identity if known.get(name) != identity[name]]
+            if apart:
+                raise CampaignError(
+                    f"{folder} holds another campaign: its {apart[0]} is {_short(known.get(apart[0]))}, and this one's "
+                    f"is {_short(identity[apart[0]])}; give another folder"
+                )
+            self.identity = known
+        else:
+            _put_text(place, json.dumps(identity, indent=2) + "\n")
+        self.suffix = self.identity["table"]
+
+    def place(self, shard: int) -> Path:
+        """Return where the table of a shard is."""
+        return self.folder / f"shard-{shard:05d}.{self.suffix}"
+
+    def write(self, shard: int, columns: Columns) -> None:
+        """Keep a shard."""
+        place = self.place(shard)
+        write_beside(place, lambda path: _write(path, columns, self.suffix))
+        entry = {"first": int(columns["case"][0]), "cases": len(columns["case"]), "sha256": _hash(place)}
+        _put_text(place.with_suffix(".json"), json.dumps(entry) + "\n")
+
+    def state(self, shard: int) -> str:
+        """Return "whole", "missing", or why the table of a shard cannot be trusted."""
+        place = self.place(shard)
+        entry = place.with_suffix(".json")
+        if not entry.exists():
+            return "missing"
+        try:
+            told = json.loads(entry.read_text(encoding="utf-8"))
+            found = _hash(place)
+        except (OSError, ValueError) as error:
+            return f"{place.name} cannot be read: {error}"
+        return "whole" if told.get("sha256") == found else f"{place.name} is not what was written: its hash differs"
+
+    def read(self, shard: int, names: list[str] | None = None) -> Columns:
+        """Return the columns of a shard, all or those named."""
+        return _read(self.place(shard), names)
+
+
+def read_identity(folder: Path) -> dict[str, Any]:
+    """Return what a folder holds a campaign of; raise `CampaignError` where it holds none."""
+    place = folder / IDENTITY
+    try:
+        found = json.loads(place.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise CampaignError(f"{str(folder)!r} holds no campaign: it has no {IDENTITY}") from None
+    except (OSError, ValueError) as error:
+        raise CampaignError(f"{place} cannot be read: {error}") from error
+    if not isinstance(found, dict) or found.get("format") != 1 or found.get("table") not in ("parquet", "npz"):
+        raise CampaignError(f"{place} is no campaign of format 1")
+    return found
+
+
+def shards(identity: dict[str, Any]) -> Iterator[tuple[int, int, int]]:
+    """Yield number, first and last case (exclusive) of each shard."""
+    cases, size = identity["cases"], identity["shard"]
+    for number, first in enumerate(range(0, cases, size)):
+        yield number, first, min(first + size, cases)
+
+
+def keep_texts(folder: Path, texts: dict[str, str]) -> None:
+    """Write what the mission was read from."""
+    for name, text in texts.items():
+        place = folder / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if not place.exists():
+            _put_text(place, text)
+
+
+def _put_text(place: Path, text: str) -> None:
+    write_beside(place, lambda path: path.write_text(text, encoding="utf-8"))
+
+
+def _hash(place: Path) -> str:
+    return hashlib.sha256(place.read_bytes()).hexdigest()
+
+
+def _write(place: Path, columns: Columns, suffix: str) -> None:
+    if suffix == "npz":
+        with place.open("wb") as file:
+            np.savez(file, **columns)  # type: ignore[arg-type]
+        return
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table({name: pa.array(column, from_pandas=True) for name, column in columns.items()})
+    pq.write_table(table, place, compression="zstd")
+
+
+def _read(place: Path, names: list[str] | None) -> Columns:
+    if place.suffix == ".npz":
+        with np.load(place) as found:
+            return {name: found[name] for name in names or found.files}
+    import pyarrow.parquet as pq
+
+    table = pq.read_table(place, columns=names)
+    return {name: _numpy(table.column(name)) for name in table.column_names}
+
+
+def _numpy(column: Any) -> np.ndarray:
+    array = column.to_numpy()
+    return np.array([value or "" for value in array], dtype=object) if array.dtype == object else array
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -1,0 +1,130 @@
+"""What many flights tell, as data: each number with its bounds."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from casadi_gnc.campaigns import statistics
+from casadi_gnc.campaigns.statistics import Estimate
+from casadi_gnc.status import StepStatus
+
+if TYPE_CHECKING:
+    from casadi_gnc.campaigns.result import Campaign
+    from casadi_gnc.missions.scheme import Metric
+
+#: Shares of all flights whose percentiles are told: the median, and what reviews ask for.
+SHARES = (0.5, 0.95, 0.99, 0.9973)
+#: Worst cases of a metric that are named.
+_WORST = 5
+
+
+def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
+    """Return what a campaign tells; see `casadi_gnc.campaigns.result.Campaign.summary`."""
+    flew = campaign.flew
+    weights = campaign.column("weight")[flew]
+    weighted = bool((weights != 1.0).any())
+    counted = weights if weighted else None
+    told = {
+        "mission": campaign.identity["mission"],
+        "scheme": campaign.identity["scheme"],
+        "cases": len(flew),
+        "asked": campaign.identity["cases"],
+        "refused": int((~flew).sum()),
+        "why": _reasons(campaign),
+        "confidence": confidence,
+        "weighted": weighted,
+        "effective_flights": statistics.effective_flights(weights) if weighted else int(flew.sum()),
+        "metrics": {},
+        "statuses": {},
+    }
+    if not flew.any():
+        return told
+    inputs = campaign.columns(campaign.identity["parameters"])[flew]
+    for metric in campaign.metrics:
+        told["metrics"][metric.name] = _metric(campaign, metric, flew, inputs, counted, confidence)
+    for bit in StepStatus:
+        raised = campaign.column(f"samples.{bit.name}")[flew] > 0
+        if raised.any():
+            share = _share(raised, counted, confidence)
+            told["statuses"][bit.name] = {"sentence": bit.sentences[0], "flights": int(raised.sum()), "share": share}
+    return told
+
+
+def _metric(
+    campaign: Campaign,
+    metric: Metric,
+    flew: np.ndarray,
+    inputs: np.ndarray,
+    weights: np.ndarray | None,
+    confidence: float,
+) -> dict[str, Any]:
+    values = campaign.column(f"metric.{metric.name}")[flew]
+    none, lowest = np.isnan(values), metric.kind == "least"
+    known = np.where(none, -math.inf if lowest else math.inf, values)
+    told: dict[str, Any] = {"unit": metric.unit, "kind": metric.kind, "without": int(none.sum()), "percentiles": {}}
+    for share in SHARES:
+        asked = 1.0 - share if lowest else share
+        found = (
+            statistics.percentile(known, asked, confidence)
+            if weights is None
+            else statistics.weighted_percentile(known, weights, asked, confidence)
+        )
+        told["percentiles"][f"{100 * asked:.6g}"] = _plain(found)
+    if weights is None:
+        low, high = statistics.limits(known, 0.9973, confidence, "lower" if lowest else "upper")
+        told["tolerance_limit"] = _number(low if lowest else high)
+        told["drivers"] = _drivers(campaign, inputs, badness(metric, values), confidence)
+    order = np.argsort(-badness(metric, values), kind="stable")[:_WORST]
+    told["worst"] = [{"case": int(campaign.column("case")[flew][i]), "value": _number(float(values[i]))} for i in order]
+    return told
+
+
+def _drivers(campaign: Campaign, inputs: np.ndarray, output: np.ndarray, confidence: float) -> list[dict[str, Any]]:
+    """Return rank correlation, and first-order index where every flight has a value, by parameter, strongest first."""
+    names = campaign.identity["parameters"]
+    if len(output) < 10 or not names or (output == output[0]).all():
+        return []
+    correlations = statistics.rank_correlations(inputs, output, confidence)
+    finite = bool(np.isfinite(output).all())
+    shares = statistics.first_order(inputs, output, confidence) if finite else [None] * len(names)
+    found = [
+        {"key": name, "rank_correlation": _plain(one), "first_order": None if share is None else _plain(share)}
+        for name, one, share in zip(names, correlations, shares, strict=True)
+        if not math.isnan(one.value)
+    ]
+    return sorted(found, key=lambda each: -abs(each["rank_correlation"]["value"] or 0.0))
+
+
+def _share(chosen: np.ndarray, weights: np.ndarray | None, confidence: float) -> dict[str, Any]:
+    if weights is not None:
+        return _plain(statistics.weighted_share(chosen, weights, confidence))
+    return _plain(statistics.share_bounds(int(chosen.sum()), len(chosen), confidence))
+
+
+def _reasons(campaign: Campaign) -> dict[str, int]:
+    """Return how many cases were refused for each kind of reason: their sentences without the numbers."""
+    import re
+
+    told = (re.sub(r"-?\d[\d.e+-]*", "#", text) for text in campaign.column("refused") if text)
+    found: dict[str, int] = {}
+    for text in told:
+        found[text] = found.get(text, 0) + 1
+    return found
+
+
+def _plain(found: Estimate) -> dict[str, float | None]:
+    return {name: _number(getattr(found, name)) for name in ("value", "low", "high")}
+
+
+def _number(value: float) -> float | None:
+    """Return a number that JSON can hold; None for none and for one without end."""
+    return float(value) if math.isfinite(value) else None
+
+
+def badness(metric: Metric, values: np.ndarray) -> np.ndarray:
+    """Return values of a metric that grow the worse they are, infinite where there is none."""
+    signed = -values if metric.kind == "least" else values
+    return np.where(np.isnan(signed), math.inf, signed)

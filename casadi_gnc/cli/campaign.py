@@ -1,0 +1,151 @@
+"""`casadi-gnc campaign`: fly many dispersed cases, go on where it was interrupted, and tell what they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from casadi_gnc.campaigns.result import Campaign
+
+
+def campaign(
+    problem: Annotated[str, typer.Argument(help='A problem file, a shipped one\'s name; or "show" and a folder.')],
+    folder: Annotated[Path | None, typer.Argument(help='After "show": folder of a campaign.')] = None,
+    flights: Annotated[int | None, typer.Option(min=1, help="Number of cases; 1000 if left out.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder of the rows; out/<mission>-campaign if left out.")] = None,
+    scheme: Annotated[str | None, typer.Option(help="Which scheme flies; the first if left out.")] = None,
+    plan: Annotated[
+        str, typer.Option(help="independent, latin_hypercube, sobol, corners, one_at_a_time or grid:LEVELS.")
+    ] = "independent",
+    seed: Annotated[int, typer.Option(min=0, help="Of the cases and their noise.")] = 0,
+    engine: Annotated[str, typer.Option(help="auto or c: compiled vector lanes on threads.")] = "auto",
+    shard: Annotated[str, typer.Option(help="i/n: only the i-th of n parts; machines may share a folder.")] = "1/1",
+    audit: Annotated[int, typer.Option(min=0, help="Cases of each shard flown again in scalar C.")] = 3,
+    threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
+    confidence: Annotated[float, typer.Option(help="Of the bounds that are told.")] = 0.9,
+    json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
+) -> None:
+    """Fly dispersed cases of a mission, or `campaign show FOLDER`: percentiles with bounds, statuses, drivers, worst.
+
+    Ctrl-C or a kill lose nothing that is finished: the same command goes on. Examples:
+
+    casadi-gnc campaign mission.toml --flights 10000 --out mc/
+
+    casadi-gnc campaign show mc/ --json
+    """
+    from casadi_gnc.campaigns.campaign import parts_of
+    from casadi_gnc.errors import CampaignError
+    from casadi_gnc.problem_files import by_name
+
+    if problem == "show":
+        if folder is None:
+            raise CampaignError("which campaign? give its folder: casadi-gnc campaign show FOLDER")
+        _print(by_name.open_campaign(folder), confidence, json)
+        return
+    if folder is not None:
+        raise CampaignError(f"what is {str(folder)!r}? the folder of a campaign is given as --out {folder}")
+    if engine not in ("auto", "c"):
+        raise CampaignError(f"no engine {engine!r}; there is auto and c")
+    with _Progress(quiet=json) as told:
+        made = by_name.campaign(
+            problem,
+            1000 if flights is None else flights,
+            scheme=scheme,
+            plan=plan,
+            seed=seed,
+            out=out or Path("out") / f"{Path(problem).stem}-campaign",
+            shard=parts_of(shard),
+            audit=audit,
+            threads=threads,
+            told=told,
+        )
+    _print(made, confidence, json)
+
+
+class _Progress:
+    """Show a bar with the time that is left, once a second has passed; on a terminal only."""
+
+    def __init__(self, *, quiet: bool) -> None:
+        import time
+
+        self._quiet, self._since, self._bar, self._task = quiet, time.monotonic(), None, None
+
+    def __enter__(self) -> Any:
+        return self._update
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def _update(self, done: int, total: int) -> None:
+        import time
+
+        if self._quiet or (self._bar is None and time.monotonic() - self._since < 1.0):
+            return
+        if self._bar is None:
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
+
+            columns = ("cases", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._task = self._bar.add_task("", total=total, completed=done)
+        self._bar.update(self._task, completed=done)  # type: ignore[arg-type]
+
+
+def _print(found: Campaign, confidence: float, json: bool) -> None:
+    import json as text
+
+    summary = found.summary(confidence)
+    if json:
+        typer.echo(text.dumps(summary, indent=2, allow_nan=False))
+        return
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    console = Console(soft_wrap=True)
+
+    def say(sentence: str) -> None:
+        console.print(sentence, highlight=False, markup=False)
+
+    flew = summary["cases"] - summary["refused"]
+    say(f"{summary['mission']}, {summary['scheme']}: {flew} flights of {summary['asked']} cases")
+    for why, count in summary["why"].items():
+        say(f"{count} cases refused: {why}")
+    percent = f"{100 * confidence:g} %"
+    table = Table(title=f"metrics, with bounds that hold at {percent}", title_justify="left")
+    table.add_column("")
+    shares = sorted({float(share) for one in summary["metrics"].values() for share in one["percentiles"]})
+    for share in shares:
+        table.add_column(f"{share:g} %", justify="right", overflow="fold")
+    table.add_column("none", justify="right")
+    table.add_column("worst case", justify="right")
+    for name, one in summary["metrics"].items():
+        unit = f" [{one['unit']}]" if one["unit"] not in ("", "-") else ""
+        cells = [_bounded(one["percentiles"].get(f"{share:g}")) for share in shares]
+        worst = str(one["worst"][0]["case"]) if one["worst"] else ""
+        table.add_row(escape(name.replace("_", " ") + unit), *cells, str(one["without"]), worst)
+    if summary["metrics"]:
+        console.print(table, soft_wrap=False)
+    for one in summary["statuses"].values():
+        share = one["share"]
+        low, high = 100 * share["low"], 100 * share["high"]
+        say(f"{one['flights']} flights ({low:.3g} to {high:.3g} % of all): {one['sentence']}")
+    for name, one in summary["metrics"].items():
+        drivers = [each for each in one.get("drivers", []) if abs(each["rank_correlation"]["value"]) >= 0.1][:3]
+        if drivers:
+            told = ", ".join(f"{each['key']} ({each['rank_correlation']['value']:+.2f})" for each in drivers)
+            say(f"{name.replace('_', ' ')} goes with {told}")
+    say(f"kept in {found.folder}; a case again: casadi-gnc fly {found.folder} --case worst:METRIC")
+
+
+def _bounded(found: dict[str, float | None] | None) -> str:
+    """Return a percentile and its bounds: "5.1 (4.9 to 5.3)"."""
+    if found is None:
+        return ""
+    value, low, high = ("never" if found[name] is None else f"{found[name]:.4g}" for name in ("value", "low", "high"))
+    return value if value == low == high else f"{value} ({low} to {high})"
