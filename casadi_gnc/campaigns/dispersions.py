@@ -8,7 +8,8 @@ from typing import Annotated
 
 from pydantic import Field, field_validator, model_validator
 
-from casadi_gnc.campaigns.distributions import Choice, Correlated, Distribution, LogUniform, Normal, Uniform
+from casadi_gnc.campaigns.correlated import Correlated
+from casadi_gnc.campaigns.distributions import Choice, Distribution, LogUniform, Normal, Uniform
 from casadi_gnc.campaigns.orientations import Direction, Form, Rotation
 from casadi_gnc.errors import CampaignError, GncError
 from casadi_gnc.system.csv_file import read_table

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from pydantic import BaseModel, ValidationError
 
+from casadi_gnc.campaigns.correlated import Correlated
 from casadi_gnc.campaigns.dispersions import DispersionTable
-from casadi_gnc.campaigns.distributions import Choice, Correlated, LogUniform, Normal, Uniform
+from casadi_gnc.campaigns.distributions import Choice, LogUniform, Normal, Uniform
 from casadi_gnc.campaigns.orientations import Direction, Rotation
 from casadi_gnc.tables.complaints import sentences
 from casadi_gnc.tables.part import MisfitError

@@ -9,7 +9,8 @@ import pytest
 from scipy import stats
 from scipy.spatial import transform
 
-from casadi_gnc.campaigns.distributions import Choice, Correlated, LogUniform, Normal, Uniform, factor
+from casadi_gnc.campaigns.correlated import Correlated, factor
+from casadi_gnc.campaigns.distributions import Choice, LogUniform, Normal, Uniform
 from casadi_gnc.campaigns.orientations import Direction, Rotation
 from casadi_gnc.campaigns.plans import Independent, LatinHypercube, Sobol
 from casadi_gnc.errors import CampaignError

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from casadi_gnc.errors import CampaignError
 
@@ -24,6 +26,22 @@ class Estimate:
     low: float
     high: float
     confidence: float
+
+
+def within_a_factor(value: float, deviation: float, freedom: int, confidence: float) -> Estimate:
+    """Return a small share with bounds that are the same factor below and above it, the upper one at most 1.
+
+    Normal theory of the logarithm: what is uncertain by a factor has no bound below zero.
+
+    Parameters
+    ----------
+    value : above 0.
+    deviation : of the value, estimated with so many degrees of freedom; infinite bounds for none.
+    """
+    if freedom < 1:
+        return Estimate(value, 0.0, 1.0, confidence)
+    factor = math.exp(min(float(student.ppf(0.5 + 0.5 * confidence, freedom)) * deviation / value, 700.0))
+    return Estimate(value, value / factor, min(value * factor, 1.0), confidence)
 
 
 def check_confidence(confidence: float) -> None:

@@ -13,7 +13,13 @@ import math
 import numpy as np
 from scipy.stats import beta, norm
 
-from casadi_gnc.campaigns.statistics.estimate import Estimate, check_confidence, check_share, numbers
+from casadi_gnc.campaigns.statistics.estimate import (
+    Estimate,
+    check_confidence,
+    check_share,
+    numbers,
+    within_a_factor,
+)
 from casadi_gnc.campaigns.statistics.percentiles import Percentile
 from casadi_gnc.errors import CampaignError
 
@@ -49,9 +55,8 @@ def weighted_share(chosen: np.ndarray, weights: np.ndarray, confidence: float = 
         return Estimate(0.0, 0.0, min(1.0, most * float(given.max())), confidence)
     parts = np.where(picked, given, 0.0)
     share = float(parts.mean())
-    spread = float(parts.std(ddof=1)) / math.sqrt(count) if count > 1 else math.inf
-    ratio = math.exp(min(float(norm.ppf(0.5 + 0.5 * confidence)) * spread / share, 700.0))
-    return Estimate(share, share / ratio, min(share * ratio, 1.0), confidence)
+    deviation = float(parts.std(ddof=1)) / math.sqrt(count) if count > 1 else math.inf
+    return within_a_factor(share, deviation, count - 1, confidence)
 
 
 def weighted_percentile(values: np.ndarray, weights: np.ndarray, share: float, confidence: float = 0.9) -> Percentile:
