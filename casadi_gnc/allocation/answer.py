@@ -22,6 +22,10 @@ class AllocationStatus(Enum):
     )
     NOT_CERTIFIED = "The forces are feasible, but the certificate does not reach the tolerance; see the gap."
     FAILED = "The solver returned nothing usable; the previous forces were kept inside the bounds."
+    DIRECTION_TURNED = (
+        "The command's direction cannot be kept: the effort has the least angle to it that the bounds allow."
+    )
+    DIRECTION_LOST = "Nothing can be made along the command: the forces are those of least error."
     BAD_COMMAND = "The command or the previous forces are not finite; the previous forces were kept inside the bounds."
 
     @property

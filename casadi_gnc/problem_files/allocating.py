@@ -14,7 +14,8 @@ import numpy as np
 
 from casadi_gnc.allocation import AllocationStatus, Allocator, Answer
 from casadi_gnc.allocation.allocator import Accuracy
-from casadi_gnc.allocation.modes import along_direction, with_minimum_impulse
+from casadi_gnc.allocation.direction import along_direction
+from casadi_gnc.allocation.impulse import with_minimum_impulse
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.problem_files.allocation_file import AllocationCase
 from casadi_gnc.system import csv_file

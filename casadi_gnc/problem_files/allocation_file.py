@@ -16,7 +16,8 @@ from pydantic import Field, model_validator
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults
-from casadi_gnc.allocation.modes import axis_scale, by_priority
+from casadi_gnc.allocation.impulse import never_fires
+from casadi_gnc.allocation.priorities import axis_scale, by_priority
 from casadi_gnc.allocation.wheels import at_speed, combine, wheel_problem
 from casadi_gnc.errors import AllocationError, ProblemError
 from casadi_gnc.mechanics.reaction_wheels import WheelArray
@@ -26,6 +27,7 @@ from casadi_gnc.tables.part import NonNegative, Part, Positive
 from casadi_gnc.tables.thrusters import MountedThrusters
 from casadi_gnc.tables.wheels import Wheels
 
+_NEAR = 1e-2  # ratio of singular values, rows of like size, below which an effort is nearly lost
 Number = Annotated[int, Field(ge=1, description="actuators are numbered from 1, in the order of the columns")]
 Table = Annotated[list[list[float]], Field(min_length=1)]
 
@@ -152,12 +154,40 @@ class AllocationCase:
         told = []
         if self.has_wheels:
             told.append("wheel speeds stay as given: their limits and desaturation hold for one sample, not along rows")
-        strength = np.linalg.svd(self.physical.effectiveness, compute_uv=False)
-        rank = int(np.sum(strength > 1e-9 * max(strength[0], 1e-300)))
-        rows = len(self.problem.effectiveness)
-        if rank < rows:
-            told.append(f"the effectiveness has rank {rank} of {rows}: some effort cannot be made by any actuator")
+        told += _rank_warnings(self.physical)
+        if self.least_force is not None:
+            never = never_fires(self.problem, self.least_force)
+            if len(never):
+                listed = ", ".join(str(number) for number in never)
+                told.append(
+                    f"least_force_N is {self.least_force:g}, and from rest actuators {listed} can never make as much: "
+                    "their upper bound, or max_rate times the sample period, is below it; they will never fire"
+                )
         return told
+
+
+def _rank_warnings(problem: AllocationProblem) -> list[str]:
+    """Return what the effectiveness of the actuators that can move lacks; those whose bounds meet make no effort."""
+    rows, movable = len(problem.effectiveness), problem.upper > problem.lower
+    columns = (problem.effectiveness * (problem.upper - problem.lower))[:, movable]
+    if not columns.size:
+        return ["no actuator can move: every lower bound meets its upper one"]
+    reach = np.linalg.norm(columns, axis=1)
+    if rows > 1 and np.all(reach > 0):  # rows in their own units
+        columns = columns / reach[:, None]
+    strength = np.zeros(rows)
+    found = np.linalg.svd(columns, compute_uv=False)
+    strength[: len(found)] = found
+    rank = int(np.sum(strength > 1e-9 * max(strength[0], 1e-300)))
+    if rank < rows:
+        of = "the effectiveness" if np.all(movable) else "the effectiveness of the actuators that can move"
+        return [f"{of} has rank {rank} of {rows}: some effort cannot be made by any actuator"]
+    if strength[-1] < _NEAR * strength[0]:
+        return [
+            f"the effectiveness of the actuators that can move is near to rank {rows - 1} of {rows} (singular values "
+            f"{strength[-1] / strength[0]:.1e} apart): some effort takes very large forces"
+        ]
+    return []
 
 
 def load_allocation(problem: str | Path) -> AllocationCase:
