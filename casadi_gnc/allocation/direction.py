@@ -3,8 +3,8 @@
 The largest s <= 1 with s u attainable by the nominal geometry is a linear program. Where no positive share is
 attainable exactly (a stuck or always-on actuator, a lower bound above zero, a lost axis), the effort e = A F that turns
 least from the command is taken, no longer than the command's projection on it where the bounds allow that.
-Least tan(angle) = |e - (d'e) d| / d'e, d = u/|u|, is a ratio of a norm and a positive linear function; with G = t F, t = 1/d'e it is the
-quadratic program
+tan(angle) = |e - (d'e) d| / d'e, d = u/|u|, is a ratio of a norm and a positive linear function; with G = t F,
+t = 1/d'e, its least value is that of the quadratic program
 
     minimise |(I - d d') A G|^2   subject to   d'A G = 1,   t lower <= G <= t upper,   t >= 1/|u|
 
@@ -51,8 +51,8 @@ def along_direction(
     """Return the allocation of the part of a command whose direction is kept, and its share along the command.
 
     Where no positive share keeps the direction, the status is DIRECTION_TURNED and the effort has the least angle to
-    the command that the bounds allow; where nothing can be made along the command it is DIRECTION_LOST, the share is 0 and
-    the forces are those of least error. For a problem of `by_priority` angles are those of its scaled rows.
+    the command that the bounds allow; where nothing can be made along the command it is DIRECTION_LOST, the share is
+    0 and the forces are those of least error. For a problem of `by_priority` angles are those of its scaled rows.
     """
     last = allocator.previous if previous is None else np.asarray(previous, dtype=float)
     problem, command = allocator.problem, np.asarray(command, dtype=float)
