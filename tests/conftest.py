@@ -5,6 +5,8 @@ import shutil
 import sys
 from pathlib import Path
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before NumPy is imported
+
 import numpy as np
 import pytest
 

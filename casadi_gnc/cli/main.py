@@ -27,6 +27,11 @@ from casadi_gnc.cli import (
 )
 from casadi_gnc.errors import GncError
 
+# Matrices here are small: threads of the linear algebra wait for each other longer than they work, a hundredfold on a
+# machine that has other work, and add in another order with their number. Read when NumPy is first imported.
+for _variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
+
 app = typer.Typer(
     name="casadi-gnc",
     help="Spacecraft guidance, navigation and control: from a problem file to flight C, with proof.",

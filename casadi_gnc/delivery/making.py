@@ -18,7 +18,7 @@ from casadi_gnc.errors import GncError, PackageError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.onboard import describe, sampled
 from casadi_gnc.missions.origin import Origin
-from casadi_gnc.problem_files.document import Document, parsed
+from casadi_gnc.problem_files.document import of_text
 from casadi_gnc.problem_files.loading import load, load_document
 
 PROBLEM, CONTROLLER = "problem.toml", "controller.json"
@@ -59,7 +59,7 @@ def _is_still(origin: Origin, controller: Controller, options: Options) -> bool:
 def load_again(origin: Origin) -> Mission:
     """Return the mission of a file once more, from the text that was read."""
     path = origin.folder / origin.name
-    return load_document(Document(path, origin.text, parsed(origin.text, path)), origin.changes, strict=False)
+    return load_document(of_text(path, origin.text), origin.changes, strict=False)
 
 
 def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tuple[Mission | None, Controller]:

@@ -1,127 +1,31 @@
-"""Problem files of kind "allocation": actuators, uncertainty, bounds, weights and faults.
+"""Problem files of kind "allocation": from their tables to a problem of `casadi_gnc.allocation`.
 
-Actuators come as thrusters (geometry in the chaser's frame, as in a mission), as wheels, both, or as
-plain matrices. `load_allocation` returns an `AllocationCase` ready for `casadi_gnc.allocation`.
+`load_allocation` returns an `AllocationCase`; what does not fit together is told with its table.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import casadi as ca
 import numpy as np
-from pydantic import Field, model_validator
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults
 from casadi_gnc.allocation.impulse import never_fires
 from casadi_gnc.allocation.priorities import axis_scale, by_priority
 from casadi_gnc.allocation.wheels import at_speed, combine, wheel_problem
-from casadi_gnc.errors import AllocationError, ProblemError
+from casadi_gnc.errors import AllocationError
 from casadi_gnc.mechanics.reaction_wheels import WheelArray
-from casadi_gnc.problem_files.document import read_kind
-from casadi_gnc.problem_files.mission_tables import Format
-from casadi_gnc.tables.part import NonNegative, Part, Positive
+from casadi_gnc.problem_files.allocation_tables import AllocationModel, Faults, SpinningWheels
+from casadi_gnc.problem_files.boundary import about
+from casadi_gnc.problem_files.document import Complaints, read_kind
 from casadi_gnc.tables.thrusters import MountedThrusters
-from casadi_gnc.tables.wheels import Wheels
 
 _NEAR = 1e-2  # ratio of singular values, rows of like size, below which an effort is nearly lost
-Number = Annotated[int, Field(ge=1, description="actuators are numbered from 1, in the order of the columns")]
-Table = Annotated[list[list[float]], Field(min_length=1)]
-
-
-class SpinningWheels(Wheels):
-    """Reaction wheels, axes in the body frame, and how fast they turn now."""
-
-    speed_rad_per_s: list[float] | None = Field(default=None, description="speeds now; zero if left out")
-    desaturation_per_s: NonNegative = Field(default=0.0, description="null-space rate that brings speeds to zero")
-
-
-class Matrices(Part):
-    """Effectiveness and uncertainty as plain matrices."""
-
-    effectiveness: Table
-    coupling: Table | None = None
-    errors: Annotated[list[Table], Field(min_length=1)] | None = None
-    lower: list[float] | float
-    upper: list[float] | float
-    max_rate_per_s: list[float] | float | None = None
-
-
-class Weights(Part):
-    """Weights of the objective; defaults as in a mission."""
-
-    accuracy: Positive = Field(default=1e6, description="h")
-    effort: list[NonNegative] | NonNegative = Field(default=1.0, description="diagonal of M1")
-    change: list[NonNegative] | NonNegative = Field(default=1.0, description="diagonal of M2")
-    preferred: list[float] | float = Field(default=0.0, description="forces that cost nothing")
-
-
-class Stuck(Part):
-    """An actuator that stays at a force."""
-
-    actuator: Number
-    force_N: float
-
-
-class Degraded(Part):
-    """An actuator whose force is only known to lie between two shares of the command."""
-
-    actuator: Number
-    low: NonNegative
-    high: NonNegative
-
-
-class Faults(Part):
-    """Known and possible faults."""
-
-    dead: list[Number] = []
-    stuck: list[Stuck] = []
-    degraded: list[Degraded] = []
-
-
-class Options(Part):
-    """How commands that cannot be met as they are, are treated."""
-
-    keep_direction: bool = Field(default=False, description="scale a command that cannot be met instead of turning it")
-    priorities: list[Annotated[int, Field(ge=0)]] | None = Field(default=None, description="one a row, 0 first")
-    priority_ratio: Annotated[float, Field(gt=1)] = 100.0
-    least_force_N: Positive | None = Field(
-        default=None, description="minimum impulse: forces are zero or at least this"
-    )
-
-    @model_validator(mode="after")
-    def _one_treatment(self) -> Options:
-        if self.keep_direction and self.least_force_N is not None:
-            raise ValueError("keep_direction and least_force_N cannot be combined; leave one out")
-        return self
-
-
-class AllocationModel(Part):
-    """An allocation file."""
-
-    format: Format
-    kind: Literal["allocation"]
-    title: str = ""
-    source: str = ""
-    sample_period_s: Positive = 0.1
-    torque_limit_N_m: list[Positive] | None = Field(default=None, description="box that a law may ask for")
-    thrusters: MountedThrusters | None = None
-    wheels: SpinningWheels | None = None
-    matrices: Matrices | None = None
-    weights: Weights = Weights()
-    faults: Faults = Faults()
-    options: Options = Options()
-
-    @model_validator(mode="after")
-    def _some_actuators(self) -> AllocationModel:
-        if self.matrices is not None and (self.thrusters is not None or self.wheels is not None):
-            raise ValueError("[matrices] stands alone; leave [thrusters] and [wheels] out")
-        if self.matrices is None and self.thrusters is None and self.wheels is None:
-            raise ValueError("no actuators: give [thrusters], [wheels], both, or [matrices]")
-        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +40,7 @@ class AllocationCase:
     row_scale : (R,), factor to put on a command before it is allocated.
     torque_limit : box that a law may ask for, (R,), or None.
     keep_direction, least_force : see the file's options.
+    doubts : sentences on what a file may not mean as it says it.
     """
 
     name: str
@@ -147,11 +52,12 @@ class AllocationCase:
     torque_limit: np.ndarray | None
     keep_direction: bool
     least_force: float | None
+    doubts: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> list[str]:
         """Sentences on what a user should know before trusting the answers."""
-        told = []
+        told = list(self.doubts)
         if self.has_wheels:
             told.append("wheel speeds stay as given: their limits and desaturation hold for one sample, not along rows")
         told += _rank_warnings(self.physical)
@@ -193,58 +99,37 @@ def _rank_warnings(problem: AllocationProblem) -> list[str]:
 def load_allocation(problem: str | Path) -> AllocationCase:
     """Return the case of an allocation file, given by path or shipped name; raise `ProblemError`."""
     document = read_kind(problem, "allocation")
-    model: AllocationModel = document.validated(AllocationModel)
-    try:
-        return _case(model, document.path.stem)
-    except AllocationError as error:
-        raise ProblemError(str(error), document.path.name) from None
+    complaints = Complaints(document)
+    model: AllocationModel | None = complaints.checked(AllocationModel, document.data)
+    complaints.settle()
+    assert model is not None
+    with about(document):
+        return _case(model, document.path.stem, complaints)
 
 
-def _case(model: AllocationModel, name: str) -> AllocationCase:
-    weights = {
-        "accuracy_weight": model.weights.accuracy,
-        "effort_weight": model.weights.effort,
-        "change_weight": model.weights.change,
-        "preferred": model.weights.preferred,
-    }
-    if model.matrices is not None:
-        given = model.matrices
-        rate = np.inf if given.max_rate_per_s is None else np.asarray(given.max_rate_per_s)
-        problem = AllocationProblem(
-            np.array(given.effectiveness),
-            given.lower,
-            given.upper,
-            coupling=given.coupling,
-            errors=given.errors,
-            max_step=rate * model.sample_period_s,
-            **weights,
-        )
-    else:
-        parts = []
-        if model.thrusters is not None:
-            parts.append(_thrusters(model.thrusters, model.sample_period_s, model.weights.accuracy))
-        if model.wheels is not None:
-            parts.append(_wheels(model.wheels, model.sample_period_s, model.weights.accuracy))
-        problem = parts[0] if len(parts) == 1 else combine(*parts)
-        # Weights of the file replace the defaults; the wheels' null-space preference stays if none is given.
-        if model.wheels is not None and "preferred" not in model.weights.model_fields_set:
-            weights.pop("preferred")
-        problem = replace(problem, **weights)
-    faults = model.faults
-    problem = with_faults(
-        problem,
-        dead=tuple(faults.dead),
-        stuck={fault.actuator: fault.force_N for fault in faults.stuck},
-        degraded={fault.actuator: (fault.low, fault.high) for fault in faults.degraded},
-    )
-    rows = len(problem.effectiveness)
-    scale, options, physical = np.ones(rows), model.options, problem
+def _case(model: AllocationModel, name: str, complaints: Complaints) -> AllocationCase:
+    """Return the case; raise `ProblemError` about the table that does not fit."""
+    options, scale, problem = model.options, np.ones(0), None
+    with complaints.about("matrices" if model.matrices is not None else "wheels" if model.wheels else "thrusters"):
+        problem = _actuators(model)
+    complaints.settle()
+    assert problem is not None
+    with complaints.about("weights"):
+        problem = replace(problem, **_weights(model))
+    doubts = tuple(_doubtful(problem, model.faults))
+    with complaints.about("faults"):
+        problem = _with_faults(problem, model.faults)
+    complaints.settle()
+    physical, rows = problem, len(problem.effectiveness)
+    scale = np.ones(rows)
     if options.priorities is not None:
-        problem = by_priority(problem, options.priorities, options.priority_ratio)
-        scale = axis_scale(options.priorities, options.priority_ratio)
+        with complaints.about("options", "priorities"):
+            scale = axis_scale(options.priorities, options.priority_ratio)
+            problem = by_priority(problem, options.priorities, options.priority_ratio)
     limit = None if model.torque_limit_N_m is None else np.array(model.torque_limit_N_m)
     if limit is not None and len(limit) != rows:
-        raise AllocationError(f"torque_limit_N_m has {len(limit)} entries, expected {rows}")
+        complaints.add(("torque_limit_N_m",), f"torque_limit_N_m has {len(limit)} entries, expected {rows}")
+    complaints.settle()
     return AllocationCase(
         name,
         model.title,
@@ -255,7 +140,73 @@ def _case(model: AllocationModel, name: str) -> AllocationCase:
         limit,
         options.keep_direction,
         options.least_force_N,
+        doubts,
     )
+
+
+def _actuators(model: AllocationModel) -> AllocationProblem:
+    """Return the problem of the actuators of a file, weights left as they are."""
+    if model.matrices is not None:
+        given = model.matrices
+        rate = np.inf if given.max_rate_per_s is None else np.asarray(given.max_rate_per_s)
+        return AllocationProblem(
+            np.array(given.effectiveness),
+            given.lower,
+            given.upper,
+            coupling=given.coupling,
+            errors=given.errors,
+            max_step=rate * model.sample_period_s,
+            accuracy_weight=model.weights.accuracy,
+        )
+    parts = []
+    if model.thrusters is not None:
+        parts.append(_thrusters(model.thrusters, model.sample_period_s, model.weights.accuracy))
+    if model.wheels is not None:
+        parts.append(_wheels(model.wheels, model.sample_period_s, model.weights.accuracy))
+    return parts[0] if len(parts) == 1 else combine(*parts)
+
+
+def _weights(model: AllocationModel) -> dict[str, Any]:
+    """Return the weights of a file; the wheels' null-space preference stays if none is given."""
+    given = model.weights
+    weights: dict[str, Any] = {
+        "accuracy_weight": given.accuracy,
+        "effort_weight": given.effort,
+        "change_weight": given.change,
+        "preferred": given.preferred,
+    }
+    if model.wheels is not None and "preferred" not in given.model_fields_set:
+        weights.pop("preferred")
+    return weights
+
+
+def _with_faults(problem: AllocationProblem, faults: Faults) -> AllocationProblem:
+    stuck, degraded = ([fault.actuator for fault in group] for group in (faults.stuck, faults.degraded))
+    for number in stuck:
+        if number in faults.dead:
+            raise AllocationError(
+                f"actuator {number} is both dead and stuck; keep one: a dead one makes no force at all"
+            )
+    for number, what in [*((each, "stuck") for each in stuck), *((each, "degraded") for each in degraded)]:
+        if (stuck if what == "stuck" else degraded).count(number) > 1:
+            raise AllocationError(f"actuator {number} is {what} twice; keep one")
+    return with_faults(
+        problem,
+        dead=tuple(faults.dead),
+        stuck={fault.actuator: fault.force_N for fault in faults.stuck},
+        degraded={fault.actuator: (fault.low, fault.high) for fault in faults.degraded},
+    )
+
+
+def _doubtful(problem: AllocationProblem, faults: Faults) -> Iterator[str]:
+    """Yield a sentence for each stuck actuator whose force is beyond the bounds that it would have."""
+    for fault in faults.stuck:
+        if fault.actuator > problem.count:
+            continue  # refused with the faults
+        low, high = (float(bound[fault.actuator - 1]) for bound in (problem.lower, problem.upper))
+        if not low <= fault.force_N <= high:
+            bounds = f"{low:g} to {high:g}"
+            yield f"actuator {fault.actuator} is stuck at {fault.force_N:g}, outside its own bounds, {bounds}"
 
 
 def _thrusters(model: MountedThrusters, period: float, accuracy: float) -> AllocationProblem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from casadi_gnc.errors import CampaignError, ProblemError
 from casadi_gnc.missions import flying
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.problem_files.boundary import about
 from casadi_gnc.problem_files.loading import load
 
 if TYPE_CHECKING:
@@ -50,12 +52,14 @@ def fly(problem: str | Path | Mission, scheme: str | None = None, **options: Any
     >>> fly("huang2020/detumble", "damping_pinv")["rate"].shape
     (15001, 3)
     """
-    return flying.fly(mission_of(problem), scheme, **options)
+    with _about(problem):
+        return flying.fly(mission_of(problem), scheme, **options)
 
 
 def fly_all(problem: str | Path | Mission, **options: Any) -> list[Flight]:
     """Return flights of all schemes of a mission, in order; options as for `fly`."""
-    return flying.fly_all(mission_of(problem), **options)
+    with _about(problem):
+        return flying.fly_all(mission_of(problem), **options)
 
 
 def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Check]:
@@ -66,7 +70,13 @@ def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Chec
     >>> sorted({each.verdict for each in check("huang2020/detumble", "observer_pinv")})
     ['note', 'ok']
     """
-    return checking.check(mission_of(problem, strict=False), scheme)
+    with _about(problem):
+        return checking.check(mission_of(problem, strict=False), scheme)
+
+
+def _about(problem: Any) -> AbstractContextManager[None]:
+    """Name the file in what is wrong, where there is one."""
+    return about(problem) if isinstance(problem, (str, Path)) else nullcontext()
 
 
 def campaign(problem: str | Path | Mission, flights: int, **options: Any) -> Campaign:
@@ -88,7 +98,8 @@ def campaign(problem: str | Path | Mission, flights: int, **options: Any) -> Cam
     """
     from casadi_gnc.campaigns.campaign import campaign as flown
 
-    return flown(mission_of(problem), flights, **options)
+    with _about(problem):
+        return flown(mission_of(problem), flights, **options)
 
 
 def open_campaign(folder: str | Path) -> Campaign:

@@ -8,8 +8,10 @@ from casadi_gnc.checking import check
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.problem_files import synthesis_checks
+from casadi_gnc.problem_files.boundary import about
 from casadi_gnc.problem_files.document import read
-from casadi_gnc.problem_files.loading import load
+from casadi_gnc.problem_files.loading import load_document
+from casadi_gnc.tables.wording import shown
 
 
 def check_file(problem: str | Path, schemes: list[str] | None = None) -> tuple[str, list[Check]]:
@@ -22,10 +24,11 @@ def check_file(problem: str | Path, schemes: list[str] | None = None) -> tuple[s
     """
     document = read(problem)
     kind = document.data.get("kind")
-    if kind == "synthesis":
-        return synthesis_checks.check(problem)
-    if kind != "mission":
-        message = f'kind is {kind!r}; check takes a file of kind "mission" or "synthesis"'
-        raise ProblemError(message, document.place(("kind",)))
-    mission = load(problem, strict=False)
-    return mission.title or mission.name, check(mission, schemes or None)
+    with about(document):
+        if kind == "synthesis":
+            return synthesis_checks.check(problem)
+        if kind != "mission":
+            message = f'kind is {shown(kind)}; check takes a file of kind "mission" or "synthesis"'
+            raise ProblemError(message, document.place(("kind",)))
+        mission = load_document(document, strict=False)
+        return mission.title or mission.name, check(mission, schemes or None)

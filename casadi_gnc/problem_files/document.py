@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import difflib
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ValidationError
 
 from casadi_gnc.errors import GncError, ProblemError
-from casadi_gnc.problem_files import toml_place
+from casadi_gnc.problem_files import toml_place, toml_text
 from casadi_gnc.system import assets
+from casadi_gnc.system.reading import text_of
 from casadi_gnc.system.text import refused
 from casadi_gnc.tables.complaints import sentences
 from casadi_gnc.tables.part import MisfitError
+from casadi_gnc.tables.wording import LONGEST, SHOWN, cut, shown
 
 Key = tuple[str | int, ...]
+#: Most complaints about one file that are told.
+_MOST = 20
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,8 @@ class Complaints:
     def checked(self, model: type[BaseModel], data: Any, key: Key = ()) -> Any:
         """Return data checked by a model, None where it does not fit; `key` is where the data stand."""
         try:
-            return model.model_validate(data, context={"folder": self._document.folder})
+            with np.errstate(all="ignore"):  # what is too large is told as a complaint
+                return model.model_validate(data, context={"folder": self._document.folder})
         except ValidationError as error:
             for path, message in sentences(error, model, data):
                 self.add((*key, *path), message)
@@ -97,13 +102,19 @@ class Complaints:
             self.add(key, str(error))
 
     def settle(self) -> None:
-        """Raise one `ProblemError` with all that was noted, if anything was."""
+        """Raise one `ProblemError` with all that was noted, if anything was; the first `_MOST` of very many."""
         if not self._found:
             return
         text = self._document.text
         last = len(text) + 1
         ordered = sorted(self._found, key=lambda each: toml_place.find(text, each[0]) or last)
-        told = [(message, self._document.place(key)) for key, message in ordered]
+        told = []
+        for key, message in ordered[:_MOST]:
+            place = self._document.place(key)
+            # Code of the user's own that failed is told with its lines.
+            told.append(("\n".join(cut(line, LONGEST - len(place) - 2) for line in message.split("\n")), place))
+        if len(ordered) > _MOST:
+            told.append((f"{len(ordered) - _MOST} more are wrong", self._document.path.name))
         raise ProblemError.several(told)
 
 
@@ -119,24 +130,24 @@ def locate(problem: str | Path) -> Path:
     try:
         if path.is_file():
             return path
+        there = path.exists()
         name = path.with_suffix("").as_posix()
-    except (OSError, ValueError) as error:
-        raise ProblemError(f"{str(problem)[:60]!r} names no file: {error}") from None
+    except (OSError, ValueError):
+        raise ProblemError(f"{cut(str(problem), SHOWN)!r} names no file") from None
     known = shipped()
     if name.removeprefix("problems/") in known:
         return assets.folder("problems") / f"{name.removeprefix('problems/')}.toml"
-    near = difflib.get_close_matches(name, known, 1)
+    if there:
+        raise ProblemError("is a folder or a pipe, expected a problem file", cut(str(problem), LONGEST // 2))
+    near = difflib.get_close_matches(name[:SHOWN], known, 1)
     hint = f'; did you mean "{near[0]}"?' if near else "; `casadi-gnc problems` lists those that are shipped"
-    raise ProblemError(f"no problem file {str(problem)!r}{hint}")
+    raise ProblemError(f"no problem file {cut(str(problem), LONGEST // 2)!r}{hint}")
 
 
 def read(problem: str | Path) -> Document:
     """Return a problem file as it stands; raise `ProblemError` on bad TOML."""
     path = locate(problem)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProblemError(f"cannot be read as UTF-8 text: {error}", str(problem)) from error
+    text = text_of(path)
     character = refused(text)  # in a comment too: the file travels with the packages that are made of it
     if character:
         number = next(k for k, line in enumerate(text.split("\n"), 1) if refused(line))
@@ -145,21 +156,28 @@ def read(problem: str | Path) -> Document:
             "leave it out",
             f"{path.name}, line {number}",
         )
-    return Document(path, text, parsed(text, path))
+    return of_text(path, text)
 
 
-def parsed(text: str, path: Path) -> dict[str, Any]:
-    """Return the content of a TOML text; raise `ProblemError` naming its file where it is none."""
+def of_text(path: Path, text: str) -> Document:
+    """Return the document of a text; raise `ProblemError` where it is no TOML, or has what no file can have."""
     try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ProblemError(f"is not valid TOML: {error}", path.name) from error
+        document = Document(path, text, toml_text.parsed(text))
+    except toml_text.TextError as error:
+        raise ProblemError(f"is not valid TOML: this line {error}", f"{path.name}, line {error.line}") from None
+    complaints = Complaints(document)
+    for key, message in toml_text.misfits(document.data):
+        complaints.add(key, message)
+    complaints.settle()
+    return document
 
 
 def read_kind(problem: str | Path, kind: str) -> Document:
     """Return a problem file; raise `ProblemError` if it is of another kind."""
     document = read(problem)
     if document.data.get("kind") != kind:
-        message = f'kind is {document.data.get("kind")!r}; this takes a file of kind "{kind}"'
+        given = document.data.get("kind")
+        what = "is missing" if given is None else f"is {shown(given)}"
+        message = f'kind {what}; this takes a file of kind "{kind}"'
         raise ProblemError(message, document.place(("kind",)))
     return document

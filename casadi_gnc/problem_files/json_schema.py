@@ -11,7 +11,7 @@ from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.missions.craft import REGISTRY as CRAFTS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.problem_files import catalogue
-from casadi_gnc.problem_files.allocation_file import AllocationModel
+from casadi_gnc.problem_files.allocation_tables import AllocationModel
 from casadi_gnc.problem_files.document import read
 from casadi_gnc.problem_files.law_tables import law_table
 from casadi_gnc.problem_files.loading import scheme_table

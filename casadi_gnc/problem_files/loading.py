@@ -22,6 +22,7 @@ from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.origin import Origin
 from casadi_gnc.problem_files import building
+from casadi_gnc.problem_files.boundary import about
 from casadi_gnc.problem_files.changing import changed
 from casadi_gnc.problem_files.document import Complaints, Document, read_kind
 from casadi_gnc.problem_files.law_tables import law_table
@@ -76,7 +77,7 @@ def load(problem: str | Path, changes: Mapping[str, Any] | None = None, *, stric
 def load_document(document: Document, changes: Mapping[str, Any] | None = None, *, strict: bool = True) -> Mission:
     """Return the mission of a document; arguments and errors as for `load`."""
     changes = changes or {}
-    with guests.recorded() as files:
+    with guests.recorded() as files, about(document):
         checked = check_tables(document, changes)
         mission = building.mission(checked, strict=strict)
     origin = Origin(document.path.name, document.text, dict(changes), tuple(files), document.folder)
@@ -134,8 +135,9 @@ def _craft(kind: type[Craft], data: dict[str, Any], own: list[str], complaints: 
             raise
         for path, message in sentences(error.__cause__, kind, {**table, **given}):
             complaints.add(path if path and path[0] in own else ("spacecraft", *path), message)
-    except TypeError as error:  # keys that are no identifiers of Python
-        complaints.add(("spacecraft",), str(error))
+    except TypeError:  # a key such as "self"
+        known = ", ".join(kind.model_fields)
+        complaints.add(("spacecraft",), f"has a key of a name that no key has; known here: {known}")
     return None
 
 

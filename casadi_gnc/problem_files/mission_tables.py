@@ -15,12 +15,13 @@ from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.requirements.requirement import ID
 from casadi_gnc.missions.scheme import MetricKind
 from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive
+from casadi_gnc.tables.wording import shown
 
 
 def _is_one(value: Any) -> Any:
     if value is not True and value == 1:
         return value
-    raise ValueError(f"format is {value!r}; this version reads format 1")
+    raise ValueError(f"format is {shown(value)}; this version reads format 1")
 
 
 Format = Annotated[Literal[1], BeforeValidator(_is_one)]

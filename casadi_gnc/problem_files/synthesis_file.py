@@ -14,7 +14,8 @@ import numpy as np
 from pydantic import Field
 
 from casadi_gnc.errors import ProblemError, SynthesisError
-from casadi_gnc.problem_files.document import Complaints, read_kind
+from casadi_gnc.problem_files.boundary import about
+from casadi_gnc.problem_files.document import Complaints, Document, read_kind
 from casadi_gnc.problem_files.mission_tables import Format
 from casadi_gnc.problem_files.synthesis_recipes import REGISTRY as RECIPES
 from casadi_gnc.problem_files.synthesis_recipes import Recipe
@@ -37,6 +38,7 @@ class SynthesisModel(Part):
 class SynthesisCase:
     """Hold what a synthesis file describes: the recipe with its matrices, and the back end."""
 
+    document: Document
     name: str
     title: str
     recipe: Recipe
@@ -59,7 +61,7 @@ def load_synthesis(problem: str | Path) -> SynthesisCase:
     assert model is not None
     assert recipe is not None
     named = model.backend if model.backend in backends.names() else backend
-    return SynthesisCase(document.path.stem, model.title, recipe, named)
+    return SynthesisCase(document, document.path.stem, model.title, recipe, named)
 
 
 def _recipe(table: dict[str, Any], complaints: Complaints) -> Recipe | None:
@@ -84,10 +86,11 @@ def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
     ProblemError
         For matrices that do not fit each other, by the recipe's words.
     """
-    try:
-        found = case.recipe.run(backend or case.backend)
-    except SynthesisError as error:
-        raise ProblemError(str(error), case.name) from None
+    with about(case.document):
+        try:
+            found = case.recipe.run(backend or case.backend)
+        except SynthesisError as error:
+            raise ProblemError(str(error), case.document.place(("recipe",))) from None
     if isinstance(found, LmiAnswer):
         return {"problem": case.name, **_inequalities(found)}
     data: dict[str, Any] = {"problem": case.name, **_inequalities(found.lmis)}

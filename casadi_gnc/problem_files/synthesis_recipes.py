@@ -10,19 +10,13 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from casadi_gnc import synthesis
 from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis import LmiAnswer, Synthesis
 from casadi_gnc.synthesis.recipes.shi2020_theorem1 import theorem1
-from casadi_gnc.tables.part import NonNegative, Part, Positive
-
-
-def _rectangular(rows: list[list[float]]) -> list[list[float]]:
-    if len({len(row) for row in rows}) > 1:
-        raise ValueError(f"rows of different length: {', '.join(str(len(row)) for row in rows)}")
-    return rows
+from casadi_gnc.tables.part import NonNegative, Part, Positive, Table
 
 
 class Recipe(Part):
@@ -46,11 +40,9 @@ def _is_matrix(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], list)
 
 
-Table = Annotated[list[list[float]], Field(min_length=1), AfterValidator(_rectangular)]
-
-
 HalfWidths = Annotated[
-    list[NonNegative] | None, Field(description="of a box of starts of the state about zero, instead of vertices")
+    Annotated[list[NonNegative], Field(min_length=1, max_length=12)] | None,
+    Field(description="of a box of starts of the state about zero, instead of vertices"),
 ]
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from pathlib import Path as FilePath
+
+from casadi_gnc.tables.wording import LONGEST, SHOWN, cut
 
 _NAME = r"(?:[A-Za-z0-9_-]+|\"[^\"]*\"|'[^']*')"
 _DOTTED = rf"{_NAME}(?:\s*\.\s*{_NAME})*"
@@ -15,6 +18,7 @@ _QUIET = re.compile(r"\"(?:[^\"\\]|\\.)*\"|'[^']*'|#.*")
 Path = tuple[str | int, ...]
 
 
+@lru_cache(maxsize=4)
 def lines_of(text: str) -> dict[Path, int]:
     """Return the line number (from 1) of every table header and key, by its path.
 
@@ -54,8 +58,8 @@ def find(text: str, path: Path) -> int | None:
 def describe(path: FilePath, text: str, key: Path) -> str:
     """Return "file, line n, table.key[i]" for messages; elements are counted from 1."""
     line = find(text, key)
-    dotted = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in key).lstrip(".")
-    return ", ".join(filter(None, (path.name, f"line {line}" if line else "", dotted)))
+    dotted = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{cut(part, SHOWN)}" for part in key).lstrip(".")
+    return ", ".join(filter(None, (path.name, f"line {line}" if line else "", cut(dotted, LONGEST // 2))))
 
 
 def _without_long_strings(line: str) -> tuple[str, str]:

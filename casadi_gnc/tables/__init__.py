@@ -6,7 +6,7 @@ from casadi_gnc.tables.disturbances import OrbitalPush, OrbitAndTorque, OuterFor
 from casadi_gnc.tables.limits import ForceAndTorqueLimits
 from casadi_gnc.tables.matrices import Inertia
 from casadi_gnc.tables.orientation import Orientation
-from casadi_gnc.tables.part import Matrix, MisfitError, NonNegative, Part, Positive, Rows, Vector, table
+from casadi_gnc.tables.part import Matrix, MisfitError, NonNegative, Part, Positive, Rows, Table, Vector, table
 from casadi_gnc.tables.thrusters import Engine, MountedThrusters, Thrusters
 from casadi_gnc.tables.wheels import Wheels
 
@@ -29,6 +29,7 @@ __all__ = [
     "Positive",
     "Robust",
     "Rows",
+    "Table",
     "Thrusters",
     "Vector",
     "Wheels",

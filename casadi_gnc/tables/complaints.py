@@ -9,6 +9,7 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 
 from casadi_gnc.tables.part import MisfitError
+from casadi_gnc.tables.wording import SHOWN, cut, expected, kind_asked, length_asked, shown
 
 Path = tuple[str | int, ...]
 #: A misspelled key leaves the right one missing: so alike that they are one mistake.
@@ -24,18 +25,26 @@ def sentences(error: ValidationError, model: type[BaseModel], data: Any) -> list
     model : which model it was.
     data : the content that was given, to tell keys of the file from alternatives that were tried.
     """
-    found: dict[Path, tuple[str, str]] = {}
+    problems: dict[Path, list[Any]] = {}
     for problem in error.errors(include_url=False):
         path = _path(problem, data)
         context = problem.get("ctx", {}).get("error")
         if isinstance(context, MisfitError):
             path = (*path, *context.path)
-        found.setdefault(path, (problem["type"], _sentence(problem, path, model, data)))
-    unknown = [path for path, (kind, _) in found.items() if kind == "extra_forbidden"]
+        problems.setdefault(path, []).append(problem)
+    # Of a choice, what comes nearest: complaints about entries say more than that a list is no number.
+    inner = {path[:-1] for path in problems if path and isinstance(path[-1], int)}
+    found = {
+        path: _sentence(each, path, model, data)
+        for path, each in problems.items()
+        if not (path in inner and all(kind_asked(one) for one in each))
+    }
+    unknown = [path for path, each in problems.items() if each[0]["type"] == "extra_forbidden"]
+    missing = {path for path, each in problems.items() if each[0]["type"] == "missing"}
     return [
         (path, text)
-        for path, (kind, text) in found.items()
-        if not (kind == "missing" and any(_is_meant(path, other) for other in unknown))
+        for path, text in found.items()
+        if not (path in missing and any(_is_meant(path, other) for other in unknown))
     ]
 
 
@@ -72,35 +81,48 @@ def value_at(data: Any, path: Path) -> Any:
     return data
 
 
-def _sentence(problem: Any, path: Path, model: type[BaseModel], data: Any) -> str:
-    kind, given = problem["type"], value_at(data, path)
+def _sentence(problems: list[Any], path: Path, model: type[BaseModel], data: Any) -> str:
+    """Return what is wrong at a path; several problems are the alternatives that a value may be."""
+    problem, given = problems[0], value_at(data, path)
+    kind = problem["type"]
     if kind == "extra_forbidden":
         return "unknown key" + near_key(str(path[-1]), keys_at(model, problem["loc"][:-1], data))
     if kind == "missing":
         return "is missing"
     if kind == "value_error":
-        return str(problem.get("ctx", {}).get("error", problem["msg"]))
-    if kind == "model_type":
-        return f"is {given!r}, expected a table"
+        return str(problem.get("ctx", {}).get("error", "does not fit"))
     if kind == "union_tag_invalid":
         told = problem["ctx"]
         known = told["expected_tags"].replace("'", "").split(", ")
-        near = difflib.get_close_matches(str(told["tag"]), known, 1)
-        sentence = f"unknown {told['discriminator'].strip(chr(39))} {told['tag']!r}"
+        near = difflib.get_close_matches(str(told["tag"])[:SHOWN], known, 1)
+        sentence = f"unknown {told['discriminator'].strip(chr(39))} {cut(repr(told['tag']), SHOWN)}"
         return sentence + (f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}")
     if kind == "union_tag_not_found":
-        return f"lacks the key {problem['ctx']['discriminator']}"
-    text = problem["msg"][0].lower() + problem["msg"][1:]
-    if not isinstance(given, (dict, list)):
-        text += f", got {given!r}"
+        return f"lacks the key {problem['ctx']['discriminator'].strip(chr(39))}"
+    asked = [each for each in map(kind_asked, problems) if each is not None]
+    if not asked:
+        return length_asked(problem) or f"is {shown(given)}, which does not fit here"
+    text = f"is {shown(given)}, expected {expected(asked)}"
     if kind == "list_type" and path and isinstance(path[-1], int):
         text += "; a matrix is written as rows, [[a, 0, 0], [0, b, 0], [0, 0, c]]"
+    elif _may_be_left_out(model, path):
+        text += "; leave it out for none"
     return text
+
+
+def _may_be_left_out(model: type[BaseModel], path: Path) -> bool:
+    """Return whether the value at a path is that of a key without which a file is as good."""
+    kinds = [model]
+    for part in path[:-1]:
+        fields = [kind.model_fields[part] for kind in kinds if isinstance(part, str) and part in kind.model_fields]
+        kinds = [found for field in fields for found in _models(field.annotation)] if fields else kinds
+    last = [kind.model_fields[path[-1]] for kind in kinds if path and path[-1] in kind.model_fields]  # type: ignore[index]
+    return any(type(None) in get_args(field.annotation) for field in last)
 
 
 def near_key(key: str, known: list[str]) -> str:
     """Return a hint at the key that was probably meant."""
-    near = difflib.get_close_matches(key, known, 1)
+    near = difflib.get_close_matches(key[:SHOWN], known, 1)
     return f"; did you mean {near[0]}?" if near else f"; known here: {', '.join(known)}"
 
 

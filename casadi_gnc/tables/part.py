@@ -9,12 +9,32 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
 
 from casadi_gnc.system.text import refused
 
+#: Most actuators of a craft: what computes with their subsets ends within seconds.
+MOST_ACTUATORS = 128
+#: Most rows or columns of a matrix.
+_LARGEST_MATRIX = 1000
+
+
+def _rectangular(rows: list[list[float]]) -> list[list[float]]:
+    sizes = {len(row) for row in rows}
+    if len(sizes) > 1 or sizes == {0}:
+        raise ValueError(f"rows of {' and '.join(map(str, sorted(sizes)[:4]))} entries, expected as many in each")
+    return rows
+
+
+#: A matrix by its rows, all as long, none empty.
+Table = Annotated[
+    list[Annotated[list[float], Field(max_length=_LARGEST_MATRIX)]],
+    Field(min_length=1, max_length=_LARGEST_MATRIX),
+    AfterValidator(_rectangular),
+]
 Vector = Annotated[list[float], Field(min_length=3, max_length=3)]
-Rows = Annotated[list[Vector], Field(min_length=1)]
+#: A vector for each actuator.
+Rows = Annotated[list[Vector], Field(min_length=1, max_length=MOST_ACTUATORS)]
 Matrix = Annotated[list[Vector], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]

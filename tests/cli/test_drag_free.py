@@ -64,7 +64,7 @@ def fly(tmp_path, text: str, *options: str) -> subprocess.CompletedProcess:
             "product_box = 5.0",
             "allows a singular one: the least moment is 10 kg m^2, and two products together can be 10 kg m^2",
         ),
-        ("filter_frequency = 15.0", "filter_frequency = 0.0", "law.filter_frequency: input should be greater than 0"),
+        ("filter_frequency = 15.0", "filter_frequency = 0.0", "law.filter_frequency: is 0.0, expected a number > 0"),
         (
             'mode = "continuous"\nsample_period_s = 5e-4\nduration_s = 100.0\nrecord_period_s = 0.01',
             'mode = "sampled"\nsample_period_s = 0.1\nduration_s = 100.0',

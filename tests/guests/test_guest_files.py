@@ -26,8 +26,8 @@ IN_THE_MISSION = {
     "an absolute path": ("./sail.py:SailCraft", "/opt/sail.py:SailCraft", 'write "./file.py:Class"'),
     "a module of ours": ("./sail.py:SailCraft", "casadi_gnc", "no craft 'casadi_gnc'; there is combined_spacecraft"),
     "a wrong key": ("area_m2 = 32.0", "mode_hz = 3.0", "unknown key; did you mean mode_Hz?"),
-    "a wrong number": ("area_m2 = 32.0", "area_m2 = -1.0", "greater than 0, got -1.0"),
-    "a gain that is none": ("attitude_gain = 0.4", "attitude_gain = nan", "finite number, got nan"),
+    "a wrong number": ("area_m2 = 32.0", "area_m2 = -1.0", "is -1.0, expected a number > 0"),
+    "a gain that is none": ("attitude_gain = 0.4", "attitude_gain = nan", "is nan, expected a finite number"),
     "an unknown law": ("./sail.py:NadirPid", "nadir_pid", "no law 'nadir_pid'; there is rate_damping"),
 }
 IN_THE_CODE = {

@@ -44,15 +44,15 @@ CASES = {
         NOMINAL,
         'channel = "axis"',
         'channel = "thruster"',
-        "input should be 'axis' or 'wheel', got 'thruster'",
+        "is 'thruster', expected 'axis' or 'wheel'",
     ),
     "deviation": (
         NOMINAL,
         "mrp_deviation = 1e-4",
         "mrp_deviation = -1e-4",
-        "sensors.mrp_deviation: .*greater than or equal to 0, got -0.0001",
+        "sensors.mrp_deviation: is -0.0001, expected a number >= 0",
     ),
-    "seed": (NOMINAL, "seed = 1", "seed = -1", "noise.seed: .*greater than or equal to 0, got -1"),
+    "seed": (NOMINAL, "seed = 1", "seed = -1", "noise.seed: is -1, expected a number >= 0"),
     "axes": (
         NOMINAL,
         "[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]",
@@ -100,7 +100,7 @@ CASES = {
         NOMINAL,
         "filter_time_constant = 1.0",
         "filter_time_constant = 0.0",
-        "filter_time_constant: .*greater than 0, got 0",
+        "filter_time_constant: is 0.0, expected a number > 0",
     ),
     "two matrices": (
         NOMINAL,
