@@ -10,7 +10,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, as_completed
+from concurrent.futures import BrokenExecutor, Future, as_completed
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -24,6 +24,7 @@ from casadi_gnc.fidelity.claims import ClaimModel, ClaimsFile
 from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.fidelity.verdict import Answer
 from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.mission_tables import MetricAsked
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets, compilers, processes
 from casadi_gnc.system.files import write_beside
@@ -86,12 +87,17 @@ def _questions(claims: list[ClaimModel]) -> dict[Question, list[tuple[str, str]]
         content = {
             "flight": json.loads(flight),
             "problem_sha256": _digest(json.loads(flight)["problem"]),
-            "metric": [{"name": claim.id, **claim.metric} for claim in askers if claim.metric is not None],
+            "metric": [_named(claim, claim.metric) for claim in askers if claim.metric is not None],
             "status": {claim.id: claim.status.model_dump() for claim in askers if claim.status is not None},
         }
         question = Question("flight", json.dumps(content, sort_keys=True))
         asked[question] = [(claim.id, "ours") for claim in askers]
     return asked
+
+
+def _named(claim: ClaimModel, metric: MetricAsked) -> dict[str, Any]:
+    """Return a claim's metric as a mission file would have it, named by the claim."""
+    return {"name": claim.id, **metric.model_dump(exclude_unset=True)}
 
 
 def _digest(problem: str) -> str:
@@ -163,8 +169,10 @@ def _result(future: Future) -> dict[str, Any]:
         return future.result()
     except GncError as error:
         return {"failure": str(error)}
-    except Exception as error:  # of a computation, or a process that died: a row, not the end
-        return {"failure": f"{type(error).__name__}: {error}"}
+    except BrokenExecutor:
+        return {"failure": "the process that answered it ended before it had; is there enough memory?"}
+    except Exception:  # whatever a computation does of numbers that it cannot take: a row, not the end
+        return {"failure": "cannot be computed of these arguments: they overflow, or leave nothing to compute"}
 
 
 def _remembered(path: Path) -> dict[str, Any] | None:

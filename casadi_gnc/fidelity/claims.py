@@ -6,24 +6,49 @@ written down; `casadi_gnc.fidelity.verdict` computes it from the two numbers.
 
 from __future__ import annotations
 
+import inspect
+from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_type_hints
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    create_model,
+    field_validator,
+    model_validator,
+)
 
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.problem_files.document import read_kind
-from casadi_gnc.problem_files.mission_tables import Format, MetricTable
+from casadi_gnc.problem_files.mission_tables import Format, MetricAsked
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system import assets
-from casadi_gnc.tables.part import Name, NonNegative, Part
+from casadi_gnc.tables.complaints import near_key, sentences
+from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part
+from casadi_gnc.tables.wording import shown
+
+
+def _found(problem: str, info: ValidationInfo) -> str:
+    """Return the path of a problem file that lies beside the claims file; a shipped one's name as it is."""
+    folder = (info.context or {}).get("folder", Path())
+    for name in (problem, f"{problem}.toml"):
+        with suppress(OSError, ValueError):  # what is no name of a file is told by its flight
+            if (folder / name).is_file():
+                return str((folder / name).resolve())
+    return problem
 
 
 class FlightModel(Part):
     """The flight that answers a claim: a shipped problem, one of its schemes, and what is changed."""
 
-    problem: str
+    problem: Annotated[str, AfterValidator(_found)] = Field(
+        description="a mission file beside the claims file, or the name of a shipped one"
+    )
     scheme: str
     mode: Literal["sampled", "continuous"] | None = None
     changes: dict[str, Any] = Field(default={}, description="values by path, e.g. 'truth.inertia_factor'")
@@ -46,8 +71,36 @@ class ComputationModel(Part):
     @classmethod
     def _is_known(cls, value: str) -> str:
         if value not in COMPUTATIONS:
-            raise ValueError(f"no computation {value!r}; there is {', '.join(COMPUTATIONS)}")
+            raise ValueError(f"no computation {shown(value)}{near_key(value, list(COMPUTATIONS))}")
         return value
+
+    @field_validator("arguments")
+    @classmethod
+    def _is_beside(cls, value: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+        problem = value.get("problem")
+        return {**value, "problem": _found(problem, info)} if isinstance(problem, str) else value
+
+    @model_validator(mode="after")
+    def _are_taken(self) -> ComputationModel:
+        table = arguments_table(self.name)
+        try:
+            table.model_validate(self.arguments)
+        except ValidationError as error:
+            path, message = sentences(error, table, self.arguments)[0]
+            raise MisfitError(message, "arguments", *path) from None
+        return self
+
+
+@lru_cache(maxsize=64)
+def arguments_table(name: str) -> type[Part]:
+    """Return the model of what a computation takes, by the types that its function declares."""
+    function = COMPUTATIONS[name]
+    hints, taken = get_type_hints(function), inspect.signature(function).parameters
+    fields: dict[str, Any] = {
+        key: (hints[key], ... if each.default is inspect.Parameter.empty else each.default)
+        for key, each in taken.items()
+    }
+    return create_model("Arguments", __base__=Part, **fields)
 
 
 class ClaimModel(Part):
@@ -65,7 +118,7 @@ class ClaimModel(Part):
     tolerance_absolute: NonNegative = 0.0
     assumption: str = Field(default="", description="what the paper does not say and the answer needs")
     flight: FlightModel | None = None
-    metric: dict[str, Any] | None = Field(default=None, description="as [[metric]] of a mission, without a name")
+    metric: MetricAsked | None = Field(default=None, description="as [[metric]] of a mission, without a name")
     status: StatusModel | None = Field(default=None, description="instead of a metric: a status of the flight")
     computation: ComputationModel | None = None
     bound: ComputationModel | None = Field(
@@ -79,8 +132,6 @@ class ClaimModel(Part):
             raise ValueError(f"claim {self.id!r} needs either a flight or a computation")
         if (self.flight is not None) != ((self.metric is not None) + (self.status is not None) == 1):
             raise ValueError(f"claim {self.id!r}: a flight, and nothing else, takes either a metric or a status")
-        if self.metric is not None:
-            MetricTable.model_validate({"name": self.id, **self.metric})
         return self
 
 

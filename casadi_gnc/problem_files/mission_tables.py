@@ -91,10 +91,9 @@ class SchemeTable(Part):
         return value
 
 
-class MetricTable(Part):
-    """One number asked of every flight."""
+class MetricAsked(Part):
+    """One number asked of a flight."""
 
-    name: Name
     kind: MetricKind
     signal: str
     threshold: Positive | None = Field(default=None, description="of settling and reaching: the norm is below it")
@@ -105,7 +104,7 @@ class MetricTable(Part):
     until_s: Positive | None = Field(default=None, description="end of the window; not of a settling")
 
     @model_validator(mode="after")
-    def _complete(self) -> MetricTable:
+    def _complete(self) -> MetricAsked:
         if (self.kind in ("settling", "reaching")) != (self.threshold is not None):
             raise ValueError("settling and reaching, and nothing else, take a threshold")
         if self.kind == "settling" and (self.after_s or self.until_s):
@@ -113,6 +112,12 @@ class MetricTable(Part):
         if self.until_s is not None and self.until_s < self.after_s:
             raise ValueError(f"until_s {self.until_s:g} is before after_s {self.after_s:g}")
         return self
+
+
+class MetricTable(MetricAsked):
+    """One number asked of every flight, and its name."""
+
+    name: Name
 
 
 class RequirementTable(Part):

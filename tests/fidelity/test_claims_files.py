@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from casadi_gnc import fidelity
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import FlightError, ProblemError
 from casadi_gnc.fidelity.claims import ClaimModel
 from casadi_gnc.fidelity.verdict import Answer, Verdict
 
@@ -99,14 +99,14 @@ metric = { kind = "peak", signal = "rate" }
 
 
 def test_a_computation_that_breaks_is_a_row(tmp_path):
-    asked = 'computation = { name = "huang2020.rotation_entry", arguments = { line = 9, column = 9 } }'
+    asked = 'computation = { name = "huang2020.rotation_entry", arguments = { row = 9, column = 9 } }'
     path = tmp_path / "claims.toml"
     path.write_text(HEAD + CUBE.format(printed=1.0, name="x").replace('computation = { name = "x" }', asked))
     told = run(str(path), "--json")
     assert told.returncode == 1
     (row,) = json.loads(told.stdout)["papers"][0]["claims"]
     assert row["verdict"] == "failed"
-    assert row["failure"].startswith("TypeError")
+    assert row["failure"].startswith("cannot be computed of these arguments")
 
 
 def test_a_changed_problem_file_is_flown_again(tmp_path):
@@ -220,3 +220,68 @@ def test_shipped_claims_are_many_and_name_what_exists(paper):
 def test_unknown_claims_file_names_what_there_is():
     with pytest.raises(ProblemError, match="no paper 'x'"):
         fidelity.read_claims("x")
+
+
+FLOWN = """
+[[claim]]
+id = "{id}"
+text = "a flight"
+where = "here"
+printed = 1.0
+flight = {{ problem = "{problem}", scheme = "damping_pinv" }}
+metric = {{ kind = "final", signal = "rate"{more} }}
+"""
+
+
+def test_problems_are_looked_for_beside_the_claims(tmp_path, monkeypatch):
+    """What lies beside the file is meant, by its name or its file's, wherever the command is run."""
+    from casadi_gnc.problem_files.document import read
+
+    folder = tmp_path / "paper"
+    folder.mkdir()
+    (folder / "mine.toml").write_text(read("huang2020/detumble").text)
+    text = "".join(FLOWN.format(id=f"c{k}", problem=name, more="") for k, name in enumerate(("mine", "mine.toml")))
+    argument = FLOWN.format(id="shipped", problem="huang2020/detumble", more="")
+    (folder / "claims.toml").write_text(HEAD + text + argument)
+    monkeypatch.chdir(tmp_path)
+    flights = [each.flight.problem for each in fidelity.read_claims("paper/claims.toml").claim]
+    assert flights == [str(folder / "mine.toml")] * 2 + ["huang2020/detumble"]
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (FLOWN.format(id="a", problem="p", more=', name = "b"'), r"line \d+, claim\[2\].metric.name: unknown key"),
+        (FLOWN.format(id="a", problem="p", more=", after_s = -1"), r"metric.after_s: is -1, expected a number >= 0"),
+        (FLOWN.format(id="a", problem="p", more=", threshold = 1.0"), "settling and reaching, and nothing else"),
+    ],
+)
+def test_metrics_of_claims_are_those_of_missions_without_a_name(tmp_path, more, message):
+    with pytest.raises(ProblemError, match=message):
+        fidelity.read_claims(written(tmp_path, more=more))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("after_s = 07:32:00", "computation.arguments.after_s: is the date or time 07:32:00; no key takes one"),
+        ('after_s = "x"', "computation.arguments.after_s: is 'x', expected a number"),
+        ("", "computation.arguments.after_s: is missing"),
+        ("after_s = 1.0, until_s = 2.0", "computation.arguments.until_s: unknown key"),
+        ("after_s = inf", "computation.arguments.after_s: is inf, expected a finite number"),
+    ],
+)
+def test_arguments_of_computations_are_checked_when_read(tmp_path, arguments, message):
+    text = CUBE.format(printed=1.0, name="shi2020.disturbance_error")
+    path = tmp_path / "claims.toml"
+    path.write_text(HEAD + text.replace(" }", f", arguments = {{ {arguments} }} }}"))
+    with pytest.raises(ProblemError, match=r"claims.toml, line \d+, claim\[1\]") as caught:
+        fidelity.read_claims(str(path))
+    assert message in str(caught.value)
+
+
+def test_a_condition_that_a_law_does_not_have_is_a_row(tmp_path):
+    from casadi_gnc.fidelity.computations.sun2018 import condition
+
+    with pytest.raises(FlightError, match=r"ProximityTracking has no condition 'nothing'; there is gains\."):
+        condition("nothing")

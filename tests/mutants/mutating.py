@@ -127,7 +127,9 @@ def scaled(text: str, draw: random.Random) -> str:
     if not places:
         return text
     place = draw.choice(places)
-    value = float(place[0].replace("_", "")) * draw.choice((-1.0, 10.0 ** draw.randint(-12, 12), 10.0 ** draw.randint(-300, 290)))
+    value = float(place[0].replace("_", "")) * draw.choice(
+        (-1.0, 10.0 ** draw.randint(-12, 12), 10.0 ** draw.randint(-300, 290))
+    )
     return text[: place.start()] + repr(value) + text[place.end() :]
 
 
@@ -164,7 +166,9 @@ def renamed(text: str, draw: random.Random) -> str:
     lines = _lines(text)
     key, rest = lines[at].split("=", 1)
     place = draw.randrange(max(1, len(key)))
-    key = draw.choice((key[:place] + key[place + 1 :], key[:place] + "x" + key[place:], "self ", "a" * 300, '"" ', "a.b.c "))
+    key = draw.choice(
+        (key[:place] + key[place + 1 :], key[:place] + "x" + key[place:], "self ", "a" * 300, '"" ', "a.b.c ")
+    )
     lines[at] = f"{key}={rest}"
     return "\n".join(lines)
 
@@ -196,7 +200,9 @@ def letters(text: str, draw: random.Random) -> str:
     """Change some letters of the text."""
     for _ in range(draw.randint(1, 4)):
         at = draw.randrange(len(text))
-        new = draw.choice(("", "[", "]", "{", "}", '"', "'", "=", ",", "\n", "#", ".", "\\", "\0", "\u202e", "é", "0", "e"))
+        new = draw.choice(
+            ("", "[", "]", "{", "}", '"', "'", "=", ",", "\n", "#", ".", "\\", "\0", "\u202e", "é", "0", "e")
+        )
         text = text[:at] + new + text[at + draw.randint(0, 1) :]
     return text
 

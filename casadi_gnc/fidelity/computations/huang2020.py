@@ -12,6 +12,7 @@ import casadi_gnc
 from casadi_gnc.allocation import AllocationProblem, solve
 from casadi_gnc.allocation.attainable import attainable
 from casadi_gnc.errors import ProblemError
+from casadi_gnc.fidelity.computations.conditions import condition_of
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry
 from casadi_gnc.missions.mission import Mission
@@ -90,7 +91,7 @@ def condition_ratio(problem: str, scheme: str, name: str, changes: dict[str, Any
     name : of the law's check, e.g. "gains.theorem1.filter".
     """
     mission = casadi_gnc.load(problem, changes or {})
-    found = next(check for check in mission.scheme(scheme).law.checks() if check.name == name)
+    found = condition_of(mission.scheme(scheme).law, name)
     return found.value / found.limit
 
 

@@ -15,6 +15,7 @@ from scipy.special import erfinv
 import casadi_gnc
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError
+from casadi_gnc.fidelity.computations.conditions import condition_of
 from casadi_gnc.laws.proximity_conditions import coupling_condition
 from casadi_gnc.mathematics.noise import normals, uniform_count, uniforms
 from casadi_gnc.missions.flight import Flight
@@ -104,7 +105,7 @@ def disturbance_phase(duration_s: float) -> float:
 
 def condition(name: str) -> float:
     """Return the left side of a condition (27), by its check."""
-    return next(check for check in _law().checks() if check.name == name).value
+    return condition_of(_law(), name).value
 
 
 def pole_ratio() -> float:
