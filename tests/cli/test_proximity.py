@@ -45,7 +45,7 @@ def test_summary_says_how_near_the_chaser_came(tmp_path):
             "not positive definite",
         ),
         ("keep_out_radius_m = 4.0", "keep_out_radius_m = 8.0", "inside the keep-out sphere of 8 m; move the point out"),
-        ("attitude_deviation = 1e-4", "attitude_deviation = -1e-4", "greater than or equal to 0, got -0.0001"),
+        ("attitude_deviation = 1e-4", "attitude_deviation = -1e-4", "is -0.0001, expected a number >= 0"),
         ("-6016.869676500585] # circular", "0.0]", "eccentricity 0.87"),
     ],
     ids=["inertia", "hold point", "noise", "orbit"],

@@ -99,7 +99,7 @@ metric = { kind = "peak", signal = "rate" }
 
 
 def test_a_computation_that_breaks_is_a_row(tmp_path):
-    asked = 'computation = { name = "huang2020.rotation_entry", arguments = { row = 9, column = 9 } }'
+    asked = 'computation = { name = "shi2020.slowest_pole", arguments = { mass_ratio = 1e308 } }'
     path = tmp_path / "claims.toml"
     path.write_text(HEAD + CUBE.format(printed=1.0, name="x").replace('computation = { name = "x" }', asked))
     told = run(str(path), "--json")

@@ -119,5 +119,5 @@ def test_one_number_cannot_follow_two_keys():
 
 def test_values_that_no_craft_can_have_are_refused_as_a_file_would_refuse_them():
     one = vary(casadi_gnc.load("huang2020/detumble"), ["truth.inertia_factor"])
-    with pytest.raises(GncError, match="greater than 0|more than 0"):
+    with pytest.raises(GncError, match="expected a number > 0"):
         one.at([-1.0])
