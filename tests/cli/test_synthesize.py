@@ -91,7 +91,7 @@ D = [[0.0], [1.0]]
     ("change", "message"),
     [
         (("B = [[0.0], [1.0]]", "B = [[0.0]]"), "B"),
-        (("A = [[0.0, 1.0], [0.0, 0.0]]", "A = [[0.0, 1.0], [0.0]]"), "rows of 1 and 2 entries, expected as many in each"),
+        (("A = [[0.0, 1.0], [0.0, 0.0]]", "A = [[0.0, 1.0], [0.0]]"), "rows of 1 and 2 entries, expected"),
         (("D = [[0.0], [1.0]]", ""), "recipe.D: is missing"),
         (('type = "state_feedback"', 'type = "magic"'), "recipe.type: no recipe 'magic'; there is state_feedback"),
         (("A = [[0.0, 1.0]", "A = [[nan, 1.0]"), "recipe.A[1][1]"),
