@@ -1,4 +1,4 @@
-"""Pictures of flights and of checks."""
+"""Pictures of flights, of checks and of campaigns."""
 
 from casadi_gnc.reports.check_picture import draw
 from casadi_gnc.reports.flight_pictures import plot_comparison, plot_flight

@@ -6,8 +6,7 @@ import math
 from pathlib import Path
 
 from casadi_gnc.checks import Check
-from casadi_gnc.errors import ProblemError
-from casadi_gnc.system.files import write_beside
+from casadi_gnc.reports.style import check_ending, save
 from casadi_gnc.system.text import picture
 
 #: Colours told apart with every kind of colour vision; each verdict has a mark of its own too.
@@ -32,8 +31,7 @@ def draw(title: str, checks: list[Check], target: Path) -> None:
     """Draw one row for each check and scheme; raise `ProblemError` for an ending that is no picture's."""
     from matplotlib.figure import Figure
 
-    if target.suffix not in (".png", ".svg", ".pdf"):
-        raise ProblemError(f"{target.name} has the ending {target.suffix!r}; a picture ends in .png, .svg or .pdf")
+    check_ending(target)
     figure = Figure(figsize=(7.2, 1.3 + 0.28 * len(checks)), dpi=120, layout="constrained")
     axes = figure.subplots()
     for row, check in enumerate(reversed(checks)):
@@ -52,4 +50,4 @@ def draw(title: str, checks: list[Check], target: Path) -> None:
     for verdict, (colour, mark) in _LOOK.items():
         axes.plot([], [], marker=mark, color=colour, linestyle="none", label=verdict)
     figure.legend(loc="outside lower center", ncols=4, frameon=False)
-    write_beside(target, lambda path: figure.savefig(path))
+    save(figure, target)

@@ -16,34 +16,30 @@ from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.recording import funnel_signals
-from casadi_gnc.system.files import write_beside
+from casadi_gnc.reports.style import COLOURS, FONT, legend, rows, save
 from casadi_gnc.system.text import picture
 
-#: Okabe and Ito's colours, told apart with every kind of colour vision.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 #: Points drawn of a signal; more are thinned to the envelope's extremes.
 _POINTS = 2000
 #: Up to so many actuators are drawn as lines.
 _FEW = 6
-#: Points; still legible when the picture is shown at half its width.
-_FONT = 12
 
 
 def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
     """Draw one flight as `<scheme>.png`, a panel for each of the mission's, and return its path."""
     panels = mission.craft.panels(mission)
-    figure, axes = _figure(len(panels), height=2.8 * len(panels))
+    figure, axes = rows(len(panels), height=2.8 * len(panels))
     draw = {"tracked": _tracked, "effort": _effort, "actuators": _actuators, "lines": _signal}
     for panel, each in zip(panels, axes, strict=True):
         draw[panel.kind](each, mission, flight, panel)
     figure.suptitle(
         picture(f"{mission.title}\n{flight.title}" if mission.title else flight.title),
-        fontsize=_FONT + 1,
+        fontsize=FONT + 1,
         x=0.02,
         ha="left",
     )
     axes[-1].set_xlabel("time [s]")
-    return _save(figure, folder / f"{flight.scheme}.png")
+    return save(figure, folder / f"{flight.scheme}.png")
 
 
 def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -> Path:
@@ -69,7 +65,7 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
             unit = flights[0].unit(signal)
             told = "" if level is None else f"settled below {level:g} {unit}".rstrip(" -")
             wanted.append((signal, f"largest {panel.label} component [{unit or '-'}]", level, told))
-    figure, axes = _figure(len(wanted), height=4.8 if len(wanted) == 1 else 2.8 * len(wanted) + 1)
+    figure, axes = rows(len(wanted), height=4.8 if len(wanted) == 1 else 2.8 * len(wanted) + 1)
     for each, (signal, label, level, told) in zip(axes, wanted, strict=True):
         for colour, flight in zip(COLOURS, flights, strict=False):
             size = np.abs(flight.block(signal)).max(axis=1)
@@ -79,9 +75,9 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
             each.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=told)
         each.set_ylabel(label if len(wanted) == 1 else "\n".join(textwrap.wrap(label, 22)))
     axes[-1].set_xlabel("time [s]")
-    axes[0].set_title(picture(mission.title), fontsize=_FONT + 1, loc="left")
-    figure.legend(loc="outside lower center", fontsize=_FONT, frameon=False)
-    return _save(figure, folder / "comparison.png")
+    axes[0].set_title(picture(mission.title), fontsize=FONT + 1, loc="left")
+    figure.legend(loc="outside lower center", fontsize=FONT, frameon=False)
+    return save(figure, folder / "comparison.png")
 
 
 def _compared(mission: Mission) -> list[tuple[Panel, str]]:
@@ -97,28 +93,6 @@ def _compared(mission: Mission) -> list[tuple[Panel, str]]:
 
 def _thresholds(mission: Mission, signal: str) -> list[float]:
     return [m.threshold for m in mission.metrics if m.kind in ("settling", "reaching") and m.signal == signal]
-
-
-def _figure(rows: int, height: float = 8.4) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, height), dpi=120, layout="constrained")
-    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-    for panel in axes:
-        panel.grid(color="0.9")
-        panel.spines[["top", "right"]].set_visible(False)
-        panel.tick_params(labelsize=_FONT)
-        panel.xaxis.label.set_size(_FONT)
-        panel.yaxis.label.set_size(_FONT)
-    return figure, axes
-
-
-def _legend(axes: Any, columns: int) -> None:
-    """Put the legend above the panel, where it hides nothing."""
-    axes.legend(
-        ncols=columns, loc="lower right", bbox_to_anchor=(1.0, 0.98), fontsize=_FONT - 1, frameon=False,
-        handlelength=1.4, columnspacing=1.2, borderaxespad=0.1,
-    )  # fmt: skip
 
 
 def _thin(time: np.ndarray, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -160,7 +134,7 @@ def _signal(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
     if panel.level is not None:
         axes.axhline(panel.level * panel.scale, color="0.4", linestyle="--", linewidth=1.2, label=panel.level_label)
     if block.shape[1] > 1 or panel.level is not None:
-        _legend(axes, block.shape[1] + 1)
+        legend(axes, block.shape[1] + 1)
 
 
 def _tracked(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
@@ -181,9 +155,9 @@ def _tracked(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
         axes.axhspan(-threshold, threshold, color="0.92", zorder=0)
         axes.annotate(
             f"±{threshold:g}", (0.995, threshold), xycoords=("axes fraction", "data"), ha="right", va="bottom",
-            fontsize=_FONT - 2, color="0.3",
+            fontsize=FONT - 2, color="0.3",
         )  # fmt: skip
-    _legend(axes, block.shape[1])
+    legend(axes, block.shape[1])
 
 
 def _walls(axes: Any, flight: Flight, lower: str, upper: str) -> None:
@@ -197,7 +171,7 @@ def _walls(axes: Any, flight: Flight, lower: str, upper: str) -> None:
     threshold = 10.0 ** np.floor(np.log10(max(narrowest, 1e-12)))
     axes.set_yscale("symlog", linthresh=threshold)
     _symmetric_ticks(axes, threshold, 1.0)
-    _legend(axes, 4)
+    legend(axes, 4)
 
 
 def _symmetric_ticks(axes: Any, finest: float, largest: float) -> None:
@@ -225,7 +199,7 @@ def _effort(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
         axes.axhline(limit * panel.scale, color="0.4", linestyle="--", linewidth=1)
     axes.plot([], [], color="0.4", linestyle="--", linewidth=1, label="limit")
     axes.set_ylabel(_axis(panel, flight, achieved))
-    _legend(axes, 5)
+    legend(axes, 5)
 
 
 def _actuators(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
@@ -238,7 +212,7 @@ def _actuators(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> Non
         _lines(axes, flight.time, block, _labels(block.shape[1]))
         for edge in (lowest, highest):
             axes.axhline(edge, color="0.4", linestyle="--", linewidth=1)
-        _legend(axes, block.shape[1])
+        legend(axes, block.shape[1])
         return
     stretch = max(1, len(block) // 700)
     whole = len(block) // stretch * stretch
@@ -250,10 +224,5 @@ def _actuators(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> Non
     )  # fmt: skip
     axes.grid(visible=False)
     bar = axes.figure.colorbar(image, ax=axes, pad=0.01)
-    bar.ax.set_title(panel.unit or flight.unit(panel.signal), fontsize=_FONT - 1)
-    bar.ax.tick_params(labelsize=_FONT - 2)
-
-
-def _save(figure: Any, target: Path) -> Path:
-    write_beside(target, lambda path: figure.savefig(path))
-    return target
+    bar.ax.set_title(panel.unit or flight.unit(panel.signal), fontsize=FONT - 1)
+    bar.ax.tick_params(labelsize=FONT - 2)
