@@ -59,7 +59,7 @@ enum gnc_alloc_status {
     GNC_ALLOC_AT_ROUNDING = 1,   /* gap <= what rounding explains; usable */
     GNC_ALLOC_NOT_CERTIFIED = 2, /* iteration limit: feasible, its gap is reported */
     GNC_ALLOC_BAD_COMMAND = 3,   /* not finite, too large, lo > hi, absent: last feasible answer returned */
-    GNC_ALLOC_BAD_PROBLEM = 4    /* set-up refused: weights, h, or numbers that are not finite */
+    GNC_ALLOC_BAD_PROBLEM = 4    /* set-up refused: weights, h, numbers that are not finite, a build with fused operations */
 };
 
 /* Which method produced the answer. */

@@ -26,6 +26,8 @@
 #if !defined(GNC_ALLOC_REAL_FLOAT)
 /* -fsingle-precision-constant defines no macro: it makes the size of this array negative. */
 typedef char gnc_alloc_constants_must_be_doubles_[(sizeof(1.0) == sizeof(double)) ? 1 : -1];
+/* Some compilers for small processors make a double a float. */
+typedef char gnc_alloc_doubles_must_have_64_bits_[(sizeof(double) == sizeof(uint64_t)) ? 1 : -1];
 #endif
 
 enum {
@@ -64,12 +66,14 @@ typedef NAME(result) result_t;
 #endif
 
 #ifdef GNC_ALLOC_REAL_FLOAT
+#define ARITHMETIC_FAULTS() gnc_arithmetic_faultsf()
 #define EPS 1.1920929e-7F /* distance from 1 to the next number */
 #define TINY 1e-30F
 #define DEFAULT_TOLERANCE 1e-3F
 #define ROUNDING_FLOOR 2e-6F
 #define CURVATURE_FLOOR 1e-6F
 #else
+#define ARITHMETIC_FAULTS() gnc_arithmetic_faults()
 #define EPS 2.220446049250313e-16
 #define TINY 1e-200
 #define DEFAULT_TOLERANCE 1e-8

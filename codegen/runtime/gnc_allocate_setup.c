@@ -162,6 +162,9 @@ int32_t NAME(setup)(data_t *data, const problem_t *problem)
         return GNC_ALLOC_BAD_PROBLEM;
     }
     (void)memset(data, 0, sizeof *data);
+    if (!GNC_ASSERT(ARITHMETIC_FAULTS() == 0U)) { /* no certificate holds in such a build */
+        return GNC_ALLOC_BAD_PROBLEM;
+    }
     if (!GNC_ASSERT(problem != NULL) || !problem_is_sound(problem)) {
         return GNC_ALLOC_BAD_PROBLEM;
     }

@@ -41,6 +41,8 @@
 
 /* -fsingle-precision-constant defines no macro: it makes the size of this array negative. */
 typedef char gnc_constants_must_be_doubles_[(sizeof(1.0) == sizeof(double)) ? 1 : -1];
+/* Some compilers for small processors make a double a float. */
+typedef char gnc_doubles_must_have_64_bits_[(sizeof(double) == sizeof(uint64_t)) ? 1 : -1];
 
 /* ---- Building blocks ------------------------------------------------------------------------------- */
 

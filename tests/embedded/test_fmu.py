@@ -129,6 +129,8 @@ def test_state_can_be_kept_and_taken_back(unit):
     assert [other.step(k, 0.1, rows[k]) for k in range(40, 80)] == first
     other.fmu.freeFMUstate(taken)
     slave.fmu.reset()
+    slave.fmu.setupExperiment(startTime=0.0)
+    slave.begin()
     fresh = Slave(unit(case)).begin()
     assert slave.step(0, 0.1, rows[0]) == fresh.step(0, 0.1, rows[0])
     for one in (slave, other, fresh):

@@ -7,10 +7,13 @@ import os
 import re
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 from packages import copied, made, run
+
+from casadi_gnc.delivery.fmu import generate_fmu
 
 DOUBLE = ("huang2020/slew", "pd_pinv", "float64")
 FLOAT = ("huang2020/slew", "pd_pinv", "float32")
@@ -63,6 +66,57 @@ def test_flags_that_leave_the_words_are_not(package, compiler, tmp_path):
         done = build(folder, compiler, flags)
         assert done.returncode == 0, (flags, done.stdout + done.stderr)
         assert done.stdout.endswith(" 0 words differ\n")
+
+
+def every_unit(folder, unit):
+    """Return all units that are made of a controller: those that fly, the replay's, the mock-up unit's."""
+    with zipfile.ZipFile(unit) as archive:
+        archive.extractall(folder.parent / "unit")
+    wrapper = folder.parent / "unit" / "sources" / "fmu.c"
+    return [*sorted(folder.glob("*.c")), folder / "test" / "replay.c", wrapper]
+
+
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_every_unit_refuses_for_itself(real, compiler, tmp_path):
+    """A build may give one file other flags than the rest; the allocator's files count too."""
+    folder = copied(made("huang2020/slew", "funnel_robust", real), tmp_path)
+    unit = generate_fmu("huang2020/slew", tmp_path / "slew.fmu", scheme="funnel_robust", real=real, name="slew")
+    sources = every_unit(folder, unit)
+    assert len(sources) == 11
+    flags = {"-ffinite-math-only": "gnc_math must see NaN", "-ffast-math": "without -ffast-math"}
+    if real == "float64":
+        flags["-Ddouble=float"] = "doubles_must_have_64_bits_"
+    for source in sources:
+        for flag, sentence in flags.items():
+            if flag == "-Ddouble=float" and source.name in ("replay.c", "fmu.c"):  # they compute nothing that flies
+                continue
+            done = run(*compiler.command, "-std=c99", flag, "-fsyntax-only", source)
+            assert done.returncode != 0, (source, flag)
+            assert sentence in done.stderr, (source, done.stderr)
+
+
+@pytest.mark.skipif(not has_fma(), reason="the processor has no fused operations")
+@pytest.mark.parametrize("real", ["float64", "float32"])
+def test_init_refuses_a_build_with_fused_operations(real, compiler, tmp_path):
+    """No compiler tells of it. Each of controller and allocator finds it where it alone was built so."""
+    folder = made("huang2020/slew", "funnel_robust", real)
+    sources = [*sorted(folder.glob("*.c")), folder / "test" / "replay.c", folder / "test" / "vectors.c"]
+    told = {"slew.c": "init refused this build", "slew_allocate_setup.c": "init refused its own defaults"}
+    objects = {}
+    for source in sources:
+        for way, flags in (("right", ["-ffp-contract=off"]), ("fused", ["-mfma", "-ffp-contract=fast"])):
+            if way == "fused" and source.name not in told:
+                continue
+            objects[source.name, way] = tmp_path / f"{source.stem}-{way}.o"
+            command = [*compiler.command, "-std=c99", "-O2", *flags, "-c", source, "-o", objects[source.name, way]]
+            done = run(*command)
+            assert done.returncode == 0, done.stderr
+    for wrong in (None, *told):
+        chosen = [objects[source.name, "fused" if source.name == wrong else "right"] for source in sources]
+        assert run(*compiler.command, *chosen, "-lm", "-o", tmp_path / "replay").returncode == 0
+        done = run(tmp_path / "replay")
+        assert (done.returncode == 0) == (wrong is None), done.stdout
+        assert told.get(wrong, " 0 words differ") in done.stdout
 
 
 #: What switches the processor before main, as another library of the same program may.
