@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from importlib import metadata
@@ -24,6 +25,7 @@ from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.origin import Origin
+from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.status import StepStatus
 
 #: Samples of a shard, about: seconds of one core.
@@ -83,13 +85,30 @@ def campaign(
         raise CampaignError(
             f"nothing differs from case to case: {mission.name} has neither a [[dispersion]] nor noise; add one"
         )
-    temporary = tempfile.TemporaryDirectory(prefix="casadi-gnc-campaign-") if out is None else None
-    folder = Path(temporary.name if temporary else out or "")
-    store = Store(folder, _identity(cases, flights, varying, plan, maths))
-    if flown.origin is not None:
-        keep_texts(folder, _texts(flown.origin, varying))
-    _fly_missing(cases, store, shard, audit, maths, vectors, threads, told)
-    return Campaign(folder, cases, temporary)
+    _refuse_unwatched(cases)
+    folder = Path(tempfile.mkdtemp(prefix="casadi-gnc-campaign-")) if out is None else Path(out)
+    try:
+        store = Store(folder, _identity(cases, flights, varying, plan, maths))
+        if flown.origin is not None:
+            keep_texts(folder, _texts(flown.origin, varying))
+        _fly_missing(cases, store, shard, audit, maths, vectors, threads, told)
+    except BaseException:
+        if out is None:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    return Campaign(folder, cases, temporary=out is None)
+
+
+def _refuse_unwatched(cases: Cases) -> None:
+    """Raise `CampaignError` for a requirement whose verdict needs every sample of a flight."""
+    watched = [one.requirement for one in cases.varied.tapes.watches]
+    for one in cases.varied.nominal.requirements:
+        if one.formula and one not in watched:
+            raise CampaignError(
+                f"requirement {one.id} looks ahead inside another condition over time, so its verdict needs every "
+                f"sample, which a campaign does not keep ({one.asked}); take always or eventually of a condition on "
+                "one sample, or fly single cases"
+            )
 
 
 def opened(mission: Mission, folder: Path) -> Campaign:
@@ -189,6 +208,8 @@ def _rows(cases: Cases, drawn: Drawn, good: np.ndarray, flights: Flown) -> Colum
     values = metrics.read_many(tuple(mission.metrics), tapes.tally, flights.tally, last, period)
     for name, numbers in values.items():
         columns[f"metric.{name}"] = _spread(numbers, good, math.nan)
+    for one in mission.requirements:
+        columns[f"requirement.{one.id}"] = _spread(_margins(cases, one, values, flights), good, math.nan)
     for bit in StepStatus:
         raised = flights.tally[:, tapes.tally.place(f"count_{bit.name}")][:, 0]
         first = flights.tally[:, tapes.tally.place(f"first_{bit.name}")][:, 0]
@@ -196,6 +217,16 @@ def _rows(cases: Cases, drawn: Drawn, good: np.ndarray, flights: Flown) -> Colum
         columns[f"first.{bit.name}"] = _spread(np.where(raised > 0, first, math.nan), good, math.nan)
     assert all(len(column) == count for column in columns.values())
     return columns
+
+
+def _margins(cases: Cases, one: Requirement, values: Columns, flights: Flown) -> np.ndarray:
+    """Return by how much each flight meets a requirement, below 0 by how much it does not."""
+    if one.metric:
+        return one.margins(values)
+    tapes = cases.varied.tapes
+    watch = next(watch for watch in tapes.watches if watch.requirement == one)
+    diverged = flights.tally[:, tapes.tally.place(f"count_{StepStatus.DIVERGED.name}")][:, 0] > 0
+    return np.where(diverged, -math.inf, watch.read(flights.tally[:, tapes.tally.place(watch.name)]))
 
 
 def _spread(numbers: np.ndarray, good: np.ndarray, otherwise: float) -> np.ndarray:

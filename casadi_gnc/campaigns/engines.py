@@ -135,6 +135,7 @@ class CompiledBatch:
         self._fly.restype, self._fly.argtypes = None, [ctypes.POINTER(_Batch)]
         self.threads = threads or os.cpu_count() or 1
         self._solvers = [allocator.solver(self.compiler) for _ in range(self.threads)] if iterates else []
+        self.tapes = tuple(tapes.functions)
         self._samples = mission.timing.samples
         self._fresh = metrics.fresh(tuple(mission.metrics), tapes.tally, tapes.watches)
         plant = mission.truth

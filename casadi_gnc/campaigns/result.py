@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
+import shutil
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,12 +40,15 @@ class Campaign:
     """Read what is kept of a campaign.
 
     Columns of the table: `case`, `noise_seed`, `weight`, each parameter by its key, `refused` (why, "" for a case
-    that flew), `metric.NAME` (NaN for none), `samples.STATUS` and `first.STATUS` (how many samples raised a status and
+    that flew), `metric.NAME` (NaN for none), `requirement.ID` (the
+    margin, below 0 where it is not met), `samples.STATUS` and `first.STATUS` (how many samples raised a status and
     when first [s]).
     """
 
-    def __init__(self, folder: Path, cases: Cases, temporary: tempfile.TemporaryDirectory[str] | None = None) -> None:
-        self.folder, self.cases, self._temporary = folder, cases, temporary
+    def __init__(self, folder: Path, cases: Cases, *, temporary: bool = False) -> None:
+        self.folder, self.cases = folder, cases
+        if temporary:
+            weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
         self.identity = read_identity(folder)
         self._store = Store(folder, self.identity)
         self._kept: Columns = {}
@@ -129,7 +133,10 @@ class Campaign:
         return self.case(f"worst:{metric}")
 
     def case(self, told: int | str) -> Case:
-        """Return a case by its number, or as "worst:METRIC", "best:METRIC" or "median:METRIC", "refused:N"."""
+        """Return a case by its number, as "worst:METRIC", "best:METRIC", "median:METRIC", or "failed:REQUIREMENT".
+
+        The last is the case that is farthest from meeting the requirement.
+        """
         number = self._number(str(told))
         place = np.flatnonzero(self.column("case") == number)
         if not len(place):
@@ -141,13 +148,29 @@ class Campaign:
         if told.isdecimal():
             return int(told)
         how, _, metric = told.partition(":")
+        if how == "failed" and metric:
+            return self._farthest(metric)
         if how not in ("worst", "best", "median") or not metric:
-            raise CampaignError(f"no case {told!r}; expected its number, worst:METRIC, best:METRIC or median:METRIC")
+            raise CampaignError(
+                f"no case {told!r}; expected its number, worst:METRIC, best:METRIC, median:METRIC or failed:REQUIREMENT"
+            )
         ranked = self.ranked(metric)
         if not len(ranked):
             raise CampaignError("no case flew: all are refused")
         place = {"worst": 0, "best": len(ranked) - 1, "median": len(ranked) // 2}[how]
         return int(ranked[place])
+
+    def _farthest(self, requirement: str) -> int:
+        known = [one.id for one in self.cases.varied.nominal.requirements]
+        if requirement not in known:
+            raise CampaignError(
+                f"the mission has no requirement {requirement!r}; there is {', '.join(known) or 'none'}"
+            )
+        flew = self.flew
+        margins = self.column(f"requirement.{requirement}")[flew]
+        if not (margins < 0).any():
+            raise CampaignError(f"no flight fails {requirement}")
+        return int(self.column("case")[flew][np.argmin(margins)])
 
     def summary(self, confidence: float = 0.9) -> dict[str, Any]:
         """Return what the flights tell, with bounds: metrics, statuses, what drives them, the worst cases."""

@@ -13,6 +13,7 @@ from casadi_gnc.status import StepStatus
 
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.result import Campaign
+    from casadi_gnc.missions.requirements import Requirement
     from casadi_gnc.missions.scheme import Metric
 
 #: Shares of all flights whose percentiles are told: the median, and what reviews ask for.
@@ -38,6 +39,7 @@ def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
         "weighted": weighted,
         "effective_flights": statistics.effective_flights(weights) if weighted else int(flew.sum()),
         "metrics": {},
+        "requirements": {},
         "statuses": {},
     }
     if not flew.any():
@@ -45,6 +47,8 @@ def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
     inputs = campaign.columns(campaign.identity["parameters"])[flew]
     for metric in campaign.metrics:
         told["metrics"][metric.name] = _metric(campaign, metric, flew, inputs, counted, confidence)
+    for one in campaign.cases.varied.nominal.requirements:
+        told["requirements"][one.id] = _requirement(campaign, one, flew, counted)
     for bit in StepStatus:
         raised = campaign.column(f"samples.{bit.name}")[flew] > 0
         if raised.any():
@@ -80,6 +84,23 @@ def _metric(
     order = np.argsort(-badness(metric, values), kind="stable")[:_WORST]
     told["worst"] = [{"case": int(campaign.column("case")[flew][i]), "value": _number(float(values[i]))} for i in order]
     return told
+
+
+def _requirement(campaign: Campaign, one: Requirement, flew: np.ndarray, weights: np.ndarray | None) -> dict[str, Any]:
+    """Return the verdict on the share of flights that meet a requirement, and the case that is farthest from it."""
+    margins = campaign.column(f"requirement.{one.id}")[flew]
+    met, worst = margins >= 0, int(np.argmin(margins))
+    told: dict[str, Any] = {"asked": one.asked, "text": one.text, "share": one.share, "confidence": one.confidence}
+    told |= {"met_by": int(met.sum()), "of": len(met)}
+    told["worst"] = {"case": int(campaign.column("case")[flew][worst]), "margin": _number(float(margins[worst]))}
+    if weights is None:
+        found = statistics.judge(int(met.sum()), len(met), one.share, one.confidence)
+        told |= {"verdict": str(found.verdict), "shown": _plain(found.share)}
+        told |= {"more_if_all_pass": found.more_if_all_pass, "more_at_this_rate": found.more_at_this_rate}
+        return told
+    shown = statistics.weighted_share(met, weights, one.confidence)
+    verdict = "met" if shown.low >= one.share else "not met" if shown.high < one.share else "undecided"
+    return told | {"verdict": verdict, "shown": _plain(shown)}
 
 
 def _drivers(campaign: Campaign, inputs: np.ndarray, output: np.ndarray, confidence: float) -> list[dict[str, Any]]:

@@ -131,6 +131,15 @@ def _print(found: Campaign, confidence: float, json: bool) -> None:
         table.add_row(escape(name.replace("_", " ") + unit), *cells, str(one["without"]), worst)
     if summary["metrics"]:
         console.print(table, soft_wrap=False)
+    for name, one in summary["requirements"].items():
+        shown = one["shown"]
+        bounds = f"{_percent(shown['low'])} to {_percent(shown['high'])}"
+        more = one.get("more_if_all_pass")
+        todo = f"; {more} more flights that all pass would meet it" if one["verdict"] == "undecided" and more else ""
+        say(
+            f"{name}: {one['verdict']}: {one['asked']} in {one['met_by']} of {one['of']} flights, {bounds} of all, "
+            f"asked of {_percent(one['share'])} with {_percent(one['confidence'])} confidence{todo}"
+        )
     for one in summary["statuses"].values():
         share = one["share"]
         low, high = 100 * share["low"], 100 * share["high"]
@@ -141,6 +150,10 @@ def _print(found: Campaign, confidence: float, json: bool) -> None:
             told = ", ".join(f"{each['key']} ({each['rank_correlation']['value']:+.2f})" for each in drivers)
             say(f"{name.replace('_', ' ')} goes with {told}")
     say(f"kept in {found.folder}; a case again: casadi-gnc fly {found.folder} --case worst:METRIC")
+
+
+def _percent(share: float | None) -> str:
+    return "?" if share is None else f"{100 * share:.6g} %"
 
 
 def _bounded(found: dict[str, float | None] | None) -> str:

@@ -42,7 +42,7 @@ def fly(
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the file's own mode.")] = None,
     decimation: Annotated[int | None, typer.Option(min=1, help="Keep every so many-th sample.")] = None,
     case: Annotated[
-        str | None, typer.Option(help="Of a campaign's folder: a number, worst:METRIC, best:METRIC or median:METRIC.")
+        str | None, typer.Option(help="Of a campaign's folder: a number, worst:METRIC, median:METRIC, failed:ID.")
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,

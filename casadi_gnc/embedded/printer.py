@@ -165,6 +165,7 @@ def print_function(
             for name, size in sizes.items()
         }
     nodes, results = _graph(function, places)
+    zero, one = c_constant(0.0, real), c_constant(1.0, real)
     used, compared = _uses(nodes, [node for _, node in results])
     body = []
     for k, node in enumerate(nodes):
@@ -178,16 +179,18 @@ def print_function(
         elif node.code == ca.OP_INPUT:
             text = node.place
         else:
+            flags = [nodes[i].is_flag and shared is None for i in node.operands]
             try:
-                text = _expression(node, [nodes[i].is_flag for i in node.operands], maths, real)
+                text = _expression(node, flags, maths, real)
             except PrinterError as error:
                 raise PrinterError(f"{function.name()}: {error}") from None
-            if shared is not None:  # both sides are evaluated: a branch would keep the loop over lanes scalar
-                text = text.replace(" && ", " & ").replace(" || ", " | ")
+            if shared is not None and node.is_flag:
+                # Vectors hold numbers: a flag is 1 or 0, and both sides of it are evaluated.
+                text = f"({text.replace(' && ', ' & ').replace(' || ', ' | ')}) ? {one} : {zero}"
             text = text.format(*(f"a{i}" for i in node.operands))
-        body.append(f"    const {flag if node.is_flag else 'gnc_real'} a{k} = {text};")
-    zero, one = c_constant(0.0, real), c_constant(1.0, real)
-    stores = [f"    {place} = a{k}{f' ? {one} : {zero}' if nodes[k].is_flag else ''};" for place, k in results]
+        body.append(f"    const {flag if node.is_flag and shared is None else 'gnc_real'} a{k} = {text};")
+    as_number = f" ? {one} : {zero}"
+    stores = [f"    {place} = a{k}{as_number if nodes[k].is_flag and shared is None else ''};" for place, k in results]
     unused = []
     if arguments is None:
         arguments = [f"const gnc_real *{name}" for name in inputs] + [f"gnc_real *{name}" for name in outputs]

@@ -173,6 +173,8 @@ class Mission:
                 raise FlightError(f"scheme {scheme.name!r} has no {key!r}; its law has {', '.join(sorted(known))}")
         paths = {f"scheme.{scheme.name}.law.{key}": value for key, value in changes.items()}
         paths |= {f"scheme.{scheme.name}.{key}": value for key, value in own.items()}
+        if "actuation" in own:
+            own["keys"] = None  # they made the one that it had
         changed = replace(scheme, **{**own, "law": replace(law, **changes) if changes else law})
         return self._noting(replace(self, schemes=(changed,), parts=self.parts_asked), paths)
 

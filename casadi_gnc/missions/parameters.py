@@ -21,6 +21,7 @@ from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.errors import FlightError, GncError, ProblemError
 from casadi_gnc.laws import Law, gains_of
 from casadi_gnc.mathematics.exact import array, is_number
+from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.tapes import Tapes, tapes_of
@@ -267,10 +268,11 @@ def _with(mission: Mission, values: dict[str, Any]) -> Mission:
     parts = Parts(craft)
     schemes = []
     for each in mission.schemes:
-        law = laws[each.name]
-        if craft is not mission.craft and each.keys is not None and law.belief_kind() is not None:
-            law = replace(law, body=parts.belief)
-        schemes.append(replace(each, law=law, actuation=_actuation(each, parts)))
+        law, actuation = laws[each.name], each.actuation
+        if craft is not mission.craft and each.keys is not None:  # made by the craft, so made again
+            actuation = _actuation(each.keys, parts)
+            law = law if law.belief_kind() is None else replace(law, body=parts.belief)
+        schemes.append(replace(each, law=law, actuation=actuation))
     return replace(mission, craft=craft, schemes=schemes, parts=parts)
 
 
@@ -295,12 +297,10 @@ def _of_craft(key: str) -> Path:
     return path[1:] if path[0] == "spacecraft" else path
 
 
-def _actuation(scheme: Scheme, parts: Parts) -> Any:
-    """Return how a scheme makes efforts: as its craft believes."""
-    if scheme.keys is None:
-        return scheme.actuation
+def _actuation(keys: Part, parts: Parts) -> Actuation:
+    """Return how a scheme with these keys makes efforts: as its craft believes."""
     try:
-        return parts.actuation(scheme.keys)
+        return parts.actuation(keys)
     except (GncError, MisfitError) as error:
         raise FlightError(f"the actuators as the flight software knows them follow from it ({error})") from error
 
