@@ -71,7 +71,7 @@ class Cases:
             at += distribution.dimensions
         numbers = np.arange(first, last)
         values = np.hstack(columns) if columns else np.empty((last - first, 0))
-        seeds = words(self.seed, Purpose.NOISE, numbers, 1)[:, 0]
+        seeds = words(self.seed, Purpose.NOISE, self.plan.noise_numbers(first, last), 1)[:, 0]
         return Drawn(numbers, values, seeds, weights, self.varied.refusals(values))
 
 

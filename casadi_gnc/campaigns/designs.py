@@ -1,4 +1,8 @@
-"""Plans without chance: corners, grid, one at a time. They look where it may go wrong; shares mean nothing in them."""
+"""Plans without chance: corners, grid, one at a time.
+
+They look where it may go wrong. Shares and percentiles of their cases mean nothing, and all cases fly in the same
+noise, so that what differs between them comes from their inputs.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +19,18 @@ from casadi_gnc.errors import CampaignError
 THREE_SIGMA = (0.0013498980316300946, 0.9986501019683699)
 
 
+class _Design(Plan):
+    """A plan without chance."""
+
+    representative = False
+
+    def noise_numbers(self, first: int, last: int) -> np.ndarray:
+        """Return zeros: all cases fly in the same noise."""
+        return np.zeros(last - first, dtype=np.int64)
+
+
 @dataclass(frozen=True)
-class Corners(Plan):
+class Corners(_Design):
     """Fly every combination of a low and a high value: 2^d cases; the last dimension changes first.
 
     Parameters
@@ -44,7 +58,7 @@ class Corners(Plan):
 
 
 @dataclass(frozen=True)
-class Grid(Plan):
+class Grid(_Design):
     """Fly every combination of some values of each dimension; the last dimension changes first.
 
     Parameters
@@ -92,7 +106,7 @@ class Grid(Plan):
 
 
 @dataclass(frozen=True)
-class OneAtATime(Plan):
+class OneAtATime(_Design):
     """Fly the middle of all, then each dimension at each of some values while the others stay in the middle.
 
     1 + d k cases: case 0 is the middle, cases 1 ... k move the first dimension.

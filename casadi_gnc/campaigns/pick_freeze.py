@@ -26,6 +26,8 @@ class PickFreeze(Plan):
 
     base: Plan
     groups: tuple[int, ...]
+    #: Cases of a block share inputs, so bounds for independent ones do not hold.
+    representative = False
 
     def __post_init__(self) -> None:
         if not self.groups or min(self.groups) < 1:
@@ -50,6 +52,10 @@ class PickFreeze(Plan):
     def cases(self) -> int | None:
         """A block for each case of the base plan."""
         return None if self.base.cases is None else self.base.cases * self.block
+
+    def noise_numbers(self, first: int, last: int) -> np.ndarray:
+        """Return the numbers of blocks: noise is the same within a block, and none of it is taken for an input's."""
+        return np.arange(first, last) // self.block
 
     def _points(self, seed: int, first: int, last: int) -> np.ndarray:
         block, member = np.divmod(np.arange(first, last), self.block)

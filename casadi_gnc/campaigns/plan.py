@@ -19,6 +19,8 @@ class Plan(ABC):
 
     #: Of the cube.
     dimensions: int
+    #: Whether cases stand for what happens, so that shares, percentiles and drivers of them mean something.
+    representative: bool = True
 
     @property
     def cases(self) -> int | None:
@@ -40,6 +42,13 @@ class Plan(ABC):
         """Return how much each case counts, (last - first,): 1 unless the plan prefers some region."""
         self._check(seed, first, last)
         return np.ones(last - first)
+
+    def noise_numbers(self, first: int, last: int) -> np.ndarray:
+        """Return the numbers by which noise is drawn, (last - first,): cases with the same one fly in the same noise.
+
+        The case's own number, unless the plan compares cases with each other.
+        """
+        return np.arange(first, last)
 
     def _check(self, seed: int, first: int, last: int) -> None:
         check_seed(seed)

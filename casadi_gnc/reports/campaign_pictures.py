@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from casadi_gnc.campaigns.statistics import Convergence, Estimate, Percentile
-from casadi_gnc.reports.style import COLOURS, FONT, check_ending, legend, plain, rows, save
+from casadi_gnc.reports.style import COLOURS, FONT, check_ending, plain, rows, save
 from casadi_gnc.system.text import picture
 
 #: Cases drawn as points; more are thinned, the worst never.
@@ -62,9 +63,9 @@ def plot_histogram(
     axes.set_xlabel(picture(label))
     axes.set_ylabel("flights [%]")
     told = f"{len(values)} flights" + (f", {int((~finite).sum())} without a value" if not finite.all() else "")
-    axes.set_title(picture(f"{title}: {told}" if title else told), fontsize=FONT, loc="left", pad=28)
+    axes.set_title(picture(f"{title}: {told}" if title else told), fontsize=FONT, loc="left")
     if percentiles or limit is not None:
-        legend(axes, 3)
+        _below(figure, axes, 3)
     return save(figure, target)
 
 
@@ -98,8 +99,8 @@ def plot_convergence(
     axes.set_xlabel("flights")
     axes.set_ylabel(picture(label))
     axes.ticklabel_format(axis="y", useOffset=False)
-    axes.set_title(picture(title), fontsize=FONT, loc="left", pad=28)
-    legend(axes, 3)
+    axes.set_title(picture(title), fontsize=FONT, loc="left")
+    _below(figure, axes, 3)
     return save(figure, target)
 
 
@@ -152,8 +153,7 @@ def plot_scatter(
     for axes in panels[columns.shape[1] :]:
         axes.set_visible(False)
     figure.suptitle(picture(title), fontsize=FONT, x=0.02, ha="left")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=FONT - 1, frameon=False)
+    _below(figure, panels[0], 2)
     return save(figure, target)
 
 
@@ -193,10 +193,16 @@ def plot_drivers(
     axes.set_yticklabels([picture(names[i]) for i in order], fontsize=FONT - 1)
     axes.grid(axis="y", visible=False)
     axes.set_xlabel(picture(label))
-    axes.set_title(picture(title), fontsize=FONT, loc="left", pad=28 if total else 8)
+    axes.set_title(picture(title), fontsize=FONT, loc="left")
     if total:
-        legend(axes, 2)
+        _below(figure, axes, 2)
     return save(figure, target)
+
+
+def _below(figure: Any, panel: Any, columns: int) -> None:
+    """Put the legend of a panel below all, where it hides nothing."""
+    handles, labels = panel.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=FONT - 1, frameon=False)
 
 
 def _points(column: np.ndarray, values: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

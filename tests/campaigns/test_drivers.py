@@ -91,6 +91,17 @@ def test_groups_count_as_one():
         assert abs(each.value - 1 + first[1]) < 0.01
 
 
+def test_noise_is_no_input(rng):
+    """With the same noise in a block, noise adds to the variance and to no input's part of it."""
+    plan = PickFreeze(Sobol(4), (1, 1))
+    noise = 2 * rng.normal(size=4096)[plan.noise_numbers(0, 4096 * 4)]
+    points = plan.points(6, 0, 4096 * 4)
+    found = indices(points @ np.array([math.sqrt(12), 0.0]) + noise, 2, 0.99)
+    for each, value in zip([*found.first, *found.total], (0.2, 0.0, 0.2, 0.0), strict=True):
+        assert each.low - 1e-12 <= value <= each.high + 1e-12
+        assert abs(each.value - value) < 0.02
+
+
 def test_bounds_depend_on_the_seed_alone():
     plan = PickFreeze(Independent(6), (1, 1, 1))
     outputs = ishigami(plan.points(0, 0, 50 * 5))

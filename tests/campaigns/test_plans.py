@@ -176,6 +176,14 @@ def test_pick_freeze_blocks_share_what_they_should():
     assert second.tolist() == [a[0], b[1], b[2]]
 
 
+def test_plans_that_compare_cases_fly_them_in_the_same_noise():
+    assert Independent(2).noise_numbers(5, 8).tolist() == [5, 6, 7]
+    assert PickFreeze(Independent(4), (1, 1)).noise_numbers(3, 9).tolist() == [0, 1, 1, 1, 1, 2]
+    assert Corners(3).noise_numbers(0, 3).tolist() == [0, 0, 0]
+    unlike = [name for name, plan in PLANS.items() if not plan.representative]
+    assert unlike == ["corners", "grid", "one at a time", "pick and freeze", "pick and freeze of latin"]
+
+
 def test_importance_weights_undo_the_preference():
     """Share beyond 4 deviations along a direction, 3.17e-5, from 20,000 cases, within 4 of its own deviations."""
     direction = (2.0, -1.0, 2.0)
