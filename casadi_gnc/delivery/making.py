@@ -50,7 +50,7 @@ def _is_still(origin: Origin, controller: Controller, options: Options) -> bool:
     """Return whether the file still says what is packed: an object may have been changed since it was read."""
     try:
         again = sampled(load_again(origin))
-        other = describe(again, controller.scheme, [one.name for one in controller.tunables])
+        other = describe(again, controller.scheme, [one.name for one in controller.tunables], monitored=True)
         return package.flight_files(other, options) == package.flight_files(controller, options)
     except GncError:
         return False
@@ -81,7 +81,7 @@ def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tupl
                 f"{sha256[:12]}); generate the package again"
             )
     mission = sampled(load(folder / PROBLEM, problem.get("changes")))
-    return mission, describe(mission, about["scheme"], tunable)
+    return mission, describe(mission, about["scheme"], tunable, monitored=True)
 
 
 def _read(path: Path) -> str:

@@ -69,7 +69,7 @@ def generate(
     for board in boards:
         board.need()
     package.check_room(folder, force)
-    controller = describe(mission, scheme, tunable)
+    controller = describe(mission, scheme, tunable, monitored=True)
     sources, made_of = making.kept(mission, controller, options, fresh=not isinstance(problem, Mission))
     about = {
         "name": options.name,
@@ -89,7 +89,7 @@ def generate(
         package.put(workshop, {**files, "test/replay.h": package.replay_header(controller, options, steps)})
         host = HostPackage(workshop, options.name)
         flown = fly_package(
-            mission, mission.scheme(controller.scheme), host, controller.outputs.size + 1, steps, SPOILED
+            mission, mission.scheme(controller.scheme), host, controller.replayed.size + 1, steps, SPOILED
         )
         files |= package.replay_files(controller, options, *flown, SPOILED)
         package.put(workshop, files)

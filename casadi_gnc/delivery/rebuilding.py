@@ -59,7 +59,7 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
     inputs = take_words(shop, "inputs", (steps, width), word)
     outputs = take_words(shop, "outputs", (steps, height), word)
     mission, controller = making.rebuilt(shop / MADE_OF, about, about["tunable"])
-    expected = 1 + controller.measured.size, controller.outputs.size + 1
+    expected = 1 + controller.measured.size, controller.replayed.size + 1
     if (width, height) != expected:
         raise PackageError(
             f"the vectors have {width} numbers in and {height} out a sample, the controller has {expected[0]} and "
@@ -82,7 +82,7 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
         put_words(shop, name, words)
     return {
         "files": {path: digest(text) for path, text in files.items()},
-        "outputs": [{"name": one.name, "size": one.size, "unit": one.unit} for one in controller.outputs.signals],
+        "outputs": [{"name": one.name, "size": one.size, "unit": one.unit} for one in controller.replayed.signals],
         "title": controller.title,
         "scheme": controller.scheme,
         "is_flown": mission is not None,
@@ -116,7 +116,7 @@ def _made(
     files = package.flight_files(controller, options)
     files["test/replay.h"] = package.replay_header(controller, options, len(inputs))
     package.put(folder, files)
-    return HostPackage(folder, options.name, flags=flags).replay(inputs, controller.outputs.size + 1)
+    return HostPackage(folder, options.name, flags=flags).replay(inputs, controller.replayed.size + 1)
 
 
 def replay(shop: Path, given: dict[str, Any]) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.embedded.monitor import Monitor
 from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.embedded.printer import Math, Real, c_constant
 from casadi_gnc.errors import PackageError
@@ -84,6 +85,7 @@ class Controller:
     tunables : parameters that stay variables.
     allocation : the problem that the on-board solver solves in each step, or None.
     statuses : bit -> (name, sentence), those that a controller can raise.
+    monitor : what the package watches on board, or None.
     """
 
     title: str
@@ -104,6 +106,7 @@ class Controller:
     statuses: dict[int, tuple[str, str]]
     tunables: tuple[Tunable, ...] = ()
     allocation: AllocationProblem | None = None
+    monitor: Monitor | None = None
 
     def __post_init__(self) -> None:
         for layout in (self.measured, self.memory, self.outputs):
@@ -121,6 +124,11 @@ class Controller:
     def outputs(self) -> Layout:
         """What the step gives besides the status."""
         return self.actuators + self.wanted + self.limited + self.report
+
+    @property
+    def replayed(self) -> Layout:
+        """What the replay of a package compares besides the status: outputs, and what the monitor says."""
+        return self.outputs if self.monitor is None else self.outputs + self.monitor.outputs
 
 
 def _constants(tape: ca.Function) -> list[int]:

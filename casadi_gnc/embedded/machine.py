@@ -25,12 +25,34 @@ class Machine:
         self._good = np.zeros(controller.measured.size)
         self._told = np.zeros(controller.actuators.size)
         self._started = False
+        self._watch()
 
     def _run(self, name: str, **ports: Any) -> dict[str, np.ndarray]:
         tape = self._c.tapes[name]
         inputs = [ports[port] if port != "e" else self._derived for port in tape.name_in()]
         results = tape.call([ca.DM(value) for value in inputs])
         return {port: np.array(value).ravel() for port, value in zip(tape.name_out(), results, strict=True)}
+
+    def _watch(self) -> None:
+        """Put the monitor where it is before the first sample."""
+        if self._c.monitor is not None:
+            self._age, self._kept = 0, np.array(self._c.monitor.initial)
+            self._lines = [np.zeros(length) for length in self._c.monitor.lines]
+
+    def _watched(self, **ports: Any) -> np.ndarray:
+        """Return robustness and verdict of each requirement of the monitor after a sample."""
+        monitor = self._c.monitor
+        if monitor is None or not monitor.watched:
+            return np.zeros(0)
+        at = [self._age % length for length in monitor.lines]
+        past = [line[i] for line, i in zip(self._lines, at, strict=True)]
+        given = {**ports, "age": min(self._age, monitor.horizon), "past": past, "kept": self._kept}
+        found = monitor.tape.call([ca.DM(given[port]) for port in monitor.tape.name_in()])
+        pushed, self._kept, robustness, verdict = (np.array(each).ravel() for each in found)
+        for line, i, value in zip(self._lines, at, pushed, strict=True):
+            line[i] = value
+        self._age += 1
+        return np.column_stack([robustness, verdict]).ravel()
 
     def step(self, row: np.ndarray) -> np.ndarray:
         """Return outputs and status of a sample; `row` is the time and the measurement."""
@@ -52,7 +74,9 @@ class Machine:
         status |= int(self._run("judge", told=told, carried=now["carried"])["verdict"][0])
         self._memory = self._run("after", told=told, carried=now["carried"])["memory"]
         self._good, self._told = now["accepted"], np.array(told)
-        return np.concatenate([told, now["wanted"], now["limited"], report, [status]])
+        given = {"t": t, "y": now["accepted"], "actuators": told, "report": report, "status": status}
+        seen = self._watched(**given, wanted=now["wanted"], limited=now["limited"])
+        return np.concatenate([told, now["wanted"], now["limited"], report, seen, [status]])
 
     def replay(self, rows: np.ndarray) -> np.ndarray:
         """Return outputs and status of samples (K, 1 + measured), from the first one on."""

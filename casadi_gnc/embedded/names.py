@@ -72,6 +72,8 @@ def check_package(name: str) -> str:
     if re.search(r"_alloc(ate)?(_|$)", name):
         owner = re.split(r"_alloc(?:ate)?(?:_|$)", name)[0]
         raise refuse(f"belongs to the allocator of a package {owner!r}")
+    if name.endswith("_monitor"):
+        raise refuse(f"belongs to the monitor of a package {name.removesuffix('_monitor')!r}")
     if name in standard.BUILDS or name == "replay" or name.startswith("replay_"):
         raise refuse("is taken in the package's own builds (CMake, make, test/replay.c)")
     if re.fullmatch(r"con|prn|aux|nul|(com|lpt)\d", name):

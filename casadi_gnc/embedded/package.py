@@ -17,6 +17,7 @@ import numpy as np
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.manifest import BUILD, MANIFEST, digest, edited, read_manifest
 from casadi_gnc.embedded.members import access
+from casadi_gnc.embedded.monitor_source import monitor_files
 from casadi_gnc.embedded.source import allocator_files, render_header, render_source, runtime_files
 from casadi_gnc.errors import OutputError
 from casadi_gnc.system import assets, temporary
@@ -29,6 +30,7 @@ def flight_files(controller: Controller, options: Options) -> dict[str, str]:
     name = options.name
     files = {f"{name}.h": render_header(controller, options), f"{name}.c": render_source(controller, options)}
     files |= allocator_files(controller, options)
+    files |= monitor_files(controller, options)
     runtime = assets.folder("codegen") / "runtime"
     files |= {file: (runtime / file).read_text(encoding="utf-8") for file in runtime_files(controller, options)}
     files["LICENSE"] = (assets.folder("codegen") / "LICENSE").read_text(encoding="utf-8")
@@ -37,12 +39,17 @@ def flight_files(controller: Controller, options: Options) -> dict[str, str]:
 
 def replay_header(controller: Controller, options: Options, steps: int) -> str:
     """Return `test/replay.h`, which names the words of inputs and outputs."""
+    watched = [one.name for one in controller.monitor.watched] if controller.monitor is not None else []
+    outputs = access(controller.outputs, "output->step." if watched else "output->")
+    for i in range(len(watched)):
+        outputs += [f"output->seen[{i}].robustness", f"({options.name}_real)output->seen[{i}].verdict"]
     return template("package_replay.h.j2").render(
         name=options.name,
         bits=64 if options.real == "double" else 32,
         steps=steps,
         inputs=["input->time", *access(controller.measured, "input->")],
-        outputs=access(controller.outputs, "output->"),
+        outputs=outputs,
+        watched=watched,
     )  # fmt: skip
 
 
@@ -51,6 +58,7 @@ def replay_files(
 ) -> dict[str, str]:
     """Return the replay program, its vectors (rows of words) and the files that build it."""
     units = [f"{options.name}.c", *allocator_files(controller, options)]
+    units += [file for file in monitor_files(controller, options) if file.endswith(".c")]
     about = {"name": options.name, "units": units, "bits": 64 if options.real == "double" else 32}
     vectors = {"inputs": _rows(inputs), "outputs": _rows(outputs), "steps": len(inputs), "spoiled": spoiled}
     return {

@@ -34,7 +34,7 @@ def render_readme(
     measured : a row a target; may be empty.
     sizes : bytes of state and parameters on this machine.
     """
-    rows = tunable_members(controller)
+    rows, monitor = tunable_members(controller), controller.monitor
     for row, one in zip(rows, controller.tunables, strict=True):
         row["default"] = ", ".join(f"{value:g}" for value in one.default)
     return template("package_readme.md.j2").render(
@@ -53,6 +53,11 @@ def render_readme(
         outputs=output_members(controller),
         statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.statuses.items()],
         tunables=rows,
+        watched=[
+            {"name": one.name, "id": one.id, "asked": one.asked, "unit": one.unit or "-", "delay": f"{one.delay:g}"}
+            for one in (monitor.watched if monitor is not None else ())
+        ],
+        left_out=[{"why": why} for _, why in (monitor.left_out if monitor is not None else ())],
         measured=measured,
         host={"state": sizes[0], "params": sizes[1]},
     )  # fmt: skip

@@ -16,6 +16,7 @@ import numpy as np
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded.controller import Controller, Tunable
+from casadi_gnc.embedded.monitor import Monitor, Watched
 from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout, Signal
 
@@ -34,6 +35,10 @@ def to_text(controller: Controller) -> str:
     content["tapes"] = {name: tape.serialize() for name, tape in controller.tapes.items()}
     content["statuses"] = [[bit, name, sentence] for bit, (name, sentence) in controller.statuses.items()]
     content["tunables"] = [asdict(one) for one in controller.tunables]
+    if controller.monitor is not None:
+        own = controller.monitor
+        kept = {"watched": [asdict(one) for one in own.watched], "tape": own.tape.serialize(), "horizon": own.horizon}
+        content["monitor"] = {**kept, "left_out": own.left_out, "lines": own.lines, "initial": own.initial}
     content["allocation"] = None if controller.allocation is None else _problem(controller.allocation)
     return json.dumps({"format": _FORMAT, "casadi": metadata.version("casadi"), **content}, indent=1) + "\n"
 
@@ -50,10 +55,22 @@ def from_text(text: str) -> Controller:
         given["tapes"] = {name: ca.Function.deserialize(tape) for name, tape in content["tapes"].items()}
         given["statuses"] = {bit: (name, sentence) for bit, name, sentence in content["statuses"]}
         given["tunables"] = tuple(Tunable(**{**one, "default": tuple(one["default"])}) for one in content["tunables"])
+        given["monitor"] = _monitor_of(content["monitor"]) if "monitor" in content else None
         given["allocation"] = None if content["allocation"] is None else _problem_of(content["allocation"])
     except (ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PackageError(f"the controller cannot be read: {type(error).__name__}: {str(error)[:200]}") from error
     return Controller(**given)
+
+
+def _monitor_of(content: dict[str, Any]) -> Monitor:
+    return Monitor(
+        watched=tuple(Watched(**one) for one in content["watched"]),
+        left_out=tuple((str(name), str(why)) for name, why in content["left_out"]),
+        tape=ca.Function.deserialize(content["tape"]),
+        lines=tuple(int(length) for length in content["lines"]),
+        initial=tuple(float(value) for value in content["initial"]),
+        horizon=int(content["horizon"]),
+    )
 
 
 def _number(value: float) -> float | str:

@@ -123,7 +123,12 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
 
 def units(folder: Path, name: str) -> list[Path]:
     """Return the C files of a package that fly."""
-    return [folder / f"{name}.c", *sorted(folder.glob(f"{name}_allocate*.c"))]
+    monitor = folder / f"{name}_monitor.c"
+    return [
+        folder / f"{name}.c",
+        *sorted(folder.glob(f"{name}_allocate*.c")),
+        *([monitor] if monitor.is_file() else []),
+    ]
 
 
 def doubles_in(objects: list[Path], target: Target) -> list[str]:

@@ -21,6 +21,7 @@ from casadi_gnc.errors import PackageError
 from casadi_gnc.laws import gains_of
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.onboard_monitor import monitor_of
 from casadi_gnc.missions.scheme import Scheme
 
 if TYPE_CHECKING:
@@ -30,7 +31,9 @@ if TYPE_CHECKING:
 _Made = dict[str, tuple[dict[str, Any], dict[str, Any]]]
 
 
-def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str] = ()) -> Controller:
+def describe(
+    mission: Mission, scheme: str | None = None, tunable: Sequence[str] = (), *, monitored: bool = False
+) -> Controller:
     """Return the sampled controller of a scheme.
 
     Parameters
@@ -38,6 +41,7 @@ def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str]
     mission : a continuous one is taken at its sample period.
     scheme : its name; the first one by default.
     tunable : gains of the law that stay variables of the C.
+    monitored : with the monitor of the mission's requirements.
 
     Raises
     ------
@@ -78,6 +82,7 @@ def describe(mission: Mission, scheme: str | None = None, tunable: Sequence[str]
         statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in Loop(mission, chosen).raised()},
         tunables=tuple(parameters),
         allocation=allocator.problem if isinstance(allocator, OnlineInFlight) else None,
+        monitor=monitor_of(mission, Loop(mission, chosen), ca.vertcat(*symbols)) if monitored else None,
     )
 
 

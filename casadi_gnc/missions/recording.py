@@ -46,7 +46,7 @@ def row_of(loop: Loop) -> Layout:
     return Layout(tuple(signal for signals in owners.values() for signal in signals))
 
 
-def _watched(loop: Loop, t: Any, y: Any) -> tuple[dict[str, Any], Any]:
+def watched(loop: Loop, t: Any, y: Any) -> tuple[dict[str, Any], Any]:
     """Return the walls and the use of the mission's funnels, and whether a signal has left its own."""
     shown, left = {}, ca.SX(0)
     for funnel in loop.mission.funnels:
@@ -65,7 +65,7 @@ def observed(loop: Loop, s: Symbols, flags: Any, report: Any) -> Any:
         StepStatus.DIVERGED: ca.logic_not(bounds.all_of(ca.fabs(s.x) <= CREDIBLE)),
         **asking.flags(plant, "status", asking.ask(plant, "status", s.t, s.x, s.actuators)),
     }
-    shown, left = _watched(loop, s.t, s.y)
+    shown, left = watched(loop, s.t, s.y)
     if loop.mission.funnels and StepStatus.FUNNEL_LEFT not in law.status(s.t, seen, s.m):
         outside[StepStatus.FUNNEL_LEFT] = left
     efforts = {"wanted": s.wanted, "limited": s.limited, "achieved": loop.made(s.y, s.actuators)}

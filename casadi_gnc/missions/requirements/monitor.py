@@ -159,13 +159,24 @@ class Monitor:
 
     def __init__(self, requirements: Sequence[Requirement], signals: Layout, period: float) -> None:
         self._tape = monitor_tape(requirements, signals, period)
+        buffer: Any
+        buffer, self._run = self._tape.step.buffer()
+        self._buffer, step = buffer, self._tape.step  # what runs points into it
+        self._in = [np.zeros(step.numel_in(i)) for i in range(step.n_in())]
+        self._out = [np.zeros(step.numel_out(i)) for i in range(step.n_out())]
+        for columns, point in ((self._in, buffer.set_arg), (self._out, buffer.set_res)):
+            for i, column in enumerate(columns):
+                if column.size:
+                    point(i, memoryview(column.data))
+        self._lengths = np.array(self._tape.lines, dtype=int)
+        self._firsts = np.cumsum(self._lengths) - self._lengths
         self.reset()
 
     def reset(self) -> None:
         """Forget everything, as before the first sample."""
         self._age = 0
-        self._kept = np.array(self._tape.initial)
-        self._lines = [np.zeros(length) for length in self._tape.lines]
+        self._in[3][:] = self._tape.initial
+        self._line, self._at = np.zeros(self._lengths.sum()), np.zeros(len(self._lengths), dtype=int)
 
     @property
     def signals(self) -> tuple[str, ...]:
@@ -200,11 +211,11 @@ class Monitor:
 
     def advance(self, row: np.ndarray) -> np.ndarray:
         """Take the next sample of the signals that are read, in order; return robustness and verdict, (2, R)."""
-        at = [self._age % length for length in self._tape.lines]
-        past = [line[i] for line, i in zip(self._lines, at, strict=True)]
-        age = min(self._age, self._tape.horizon)
-        pushed, kept, *found = self._tape.step.call([ca.DM(row), ca.DM(age), ca.DM(past), ca.DM(self._kept)])
-        for line, i, value in zip(self._lines, at, np.array(pushed).ravel(), strict=True):
-            line[i] = value
-        self._kept, self._age = np.array(kept).ravel(), self._age + 1
-        return np.array([np.array(ca.DM(each)).ravel() for each in found])
+        (given, age, past, kept), (pushed, later, *found) = self._in, self._out
+        places = self._firsts + self._at
+        given[:], age[:], past[:] = row, min(self._age, self._tape.horizon), self._line[places]
+        self._run()
+        kept[:], self._line[places] = later, pushed
+        self._at = (self._at + 1) % self._lengths
+        self._age += 1
+        return np.array(found)
