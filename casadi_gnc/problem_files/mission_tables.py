@@ -123,7 +123,7 @@ class MetricTable(MetricAsked):
 class RequirementTable(Part):
     """What every flight must meet: a bound on a metric, or a formula over signals and time."""
 
-    id: Annotated[str, Field(pattern=ID, description="letters, digits, ., _ and -")]
+    id: str = Field(description="letters, digits, ., _ and -", json_schema_extra={"pattern": ID})
     text: str = Field(default="", description="in words")
     metric: Name | None = Field(default=None, description="a metric of this file, with at_most or at_least")
     at_most: float | None = Field(default=None, description="in the metric's unit")

@@ -72,15 +72,15 @@ WRONG = {
     'id = "A"': "requirement[1]: A has neither: a metric with at_most or at_least, or a formula",
     'id = "A"\nmetric = "settling_time"\nformula = "always(time >= 0)"': "requirement[1]: A has both; keep one of them",
     'id = "A"\nmetric = "settling_time"': "requirement[1].metric: A bounds settling_time by nothing; give at_most or at_least",
-    'id = "A"\nmetric = "settling_time"\nat_most = 1\nshare = 0': "requirement[1].share: input should be greater than 0, got 0",
-    'id = "A"\nmetric = "settling_time"\nat_most = 1\nshare = 1.5': "requirement[1].share: input should be less than or equal to 1",
+    'id = "A"\nmetric = "settling_time"\nat_most = 1\nshare = 0': "requirement[1].share: is 0, expected a number > 0",
+    'id = "A"\nmetric = "settling_time"\nat_most = 1\nshare = 1.5': "requirement[1].share: is 1.5, expected a number <= 1",
     'id = "A"\nmetric = "settling_time"\nat_most = 1\n[[requirement]]\nid = "A"\nmetric = "settling_time"\nat_most = 2': (
         "requirement[2].id: the id 'A' is given twice"
     ),
     'id = "A"\nformula = "always(norm(rat) <= 1)"': "there is no signal 'rat'; did you mean rate? (scheme damping_pinv)",
     'id = "A"\nformula = "always(norm(rate) <= )"': 'requirement[1].formula: A: at character 22 of the formula, after "always(norm(rate) <="',
     'id = "A"\nformula = "always[0.04, 0.06](norm(rate) <= 1)"': "no sample lies from 0.04 to 0.06 s; there is one every 0.1 s",
-    'id = "A B"\nmetric = "settling_time"\nat_most = 1': "requirement[1].id: string should match pattern",
+    'id = "A B"\nmetric = "settling_time"\nat_most = 1': "requirement[1].id: a requirement has the id 'A B', expected letters, digits, ., _ and -, the first a letter",
     'id = "A"\nmetrik = "settling_time"': "requirement[1].metrik: unknown key; did you mean metric?",
     'id = "A"\nformula = "always(observed_torque[1] <= 1)"': "there is no signal 'observed_torque'",
 }
