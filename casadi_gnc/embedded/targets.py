@@ -5,6 +5,7 @@ The emulator advances its clock with each instruction, so counts are exact and t
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from dataclasses import dataclass
@@ -16,7 +17,7 @@ import numpy as np
 from casadi_gnc.embedded import stack
 from casadi_gnc.embedded.boards import Target
 from casadi_gnc.errors import TargetError
-from casadi_gnc.system import assets
+from casadi_gnc.system import assets, folders
 from casadi_gnc.system.folders import workshop
 
 #: Flags of every target; the same as on the host, with sections that the linker may drop.
@@ -114,7 +115,7 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
         rest = [_compile(source, shop, folder, target, _BOARD_FLAGS) for source in extra]
         image = shop / "image.elf"
         link = [target.compiler, *target.flags, *target.link, f"-T{target.place(target.script)}", "-Wl,--gc-sections"]
-        _run([*link, *map(str, objects + rest), "-lm", "-o", str(image)], target)
+        _run([*link, *map(str, objects + rest), "-lm", "-o", str(image)], target, shop)
         words = _emulate(image, target, shop)
         text, data, bss = _size(objects, target)
         bound = stack.deepest([path.with_suffix(".ci") for path in objects], f"{name}_step")
@@ -156,15 +157,21 @@ def _tool(target: Target, tool: str) -> str:
 def _compile(source: Path, shop: Path, folder: Path, target: Target, flags: tuple[str, ...]) -> Path:
     product = shop / f"{source.stem}.o"
     include = [f"-I{path}" for path in (folder, folder / "test", assets.folder("codegen") / "targets")]
-    _run([target.compiler, *target.flags, *flags, *include, "-c", str(source), "-o", str(product)], target)
+    _run([target.compiler, *target.flags, *flags, *include, "-c", str(source), "-o", str(product)], target, shop)
     return product
 
 
-def _run(command: list[str], target: Target) -> str:
+def _run(command: list[str], target: Target, shop: Path | None = None) -> str:
+    """Return what a tool said; its own temporary files go to `shop`, and its complaints are in English."""
+    environment = {**os.environ, "LC_ALL": "C", **({"TMPDIR": str(shop)} if shop else {})}
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", timeout=PATIENCE, env=environment
+        )
     except (OSError, subprocess.SubprocessError) as error:
         raise TargetError(f"target {target.name}: {command[0]} could not be run: {error}") from error
+    if done.returncode and shop and (full := folders.out_of_room(done.stderr, shop.parent)):
+        raise TargetError(f"target {target.name}: {full}")
     if done.returncode:
         lines = [line for line in done.stderr.splitlines() if not line.startswith("collect2:")]
         said = [line for word in ("error", "cannot", "undefined", "overflow") for line in lines if word in line]

@@ -1,5 +1,6 @@
 """What is refused, and what stays as it was when something is."""
 
+import dataclasses
 import json
 import re
 import subprocess
@@ -12,7 +13,7 @@ import casadi_gnc
 from casadi_gnc.delivery import packaging
 from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.delivery.verifying import read_vectors, verify
-from casadi_gnc.embedded import package
+from casadi_gnc.embedded import boards, package, targets
 from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.errors import CompilerError, OutputError, PackageError, PrinterError, TargetError
 from casadi_gnc.laws import REGISTRY
@@ -286,3 +287,13 @@ def test_float_package_warns_where_rounding_matters():
     assert packaging.warnings(mission, "funnel_pinv", "float64") == []
     stiff = mission.with_scheme("pd_pinv", attitude_gain=1e6)
     assert "numbers.float32" in packaging.warnings(stiff, "pd_pinv", "float32")[0]
+
+
+def test_a_full_disk_is_no_fault_of_a_target(tmp_path):
+    """What a cross compiler says of its disk names the folder and the variable, not the source."""
+    fake = tmp_path / "fakecc"
+    fake.write_text("#!/bin/sh\necho 'fatal error: error writing to /x/y.s: No space left on device' >&2\nexit 1\n")
+    fake.chmod(0o755)
+    board = dataclasses.replace(boards.find("cortex-m7"), compiler=str(fake), emulator=("true",))
+    with pytest.raises(TargetError, match=r"target cortex-m7: \S+ has no space left; free some, or set TMPDIR to"):
+        targets.measure(made(*PLAIN), "slew", board)
