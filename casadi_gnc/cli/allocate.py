@@ -78,6 +78,7 @@ def _stream(allocator: CaseAllocator, tally: Tally, *, json: bool) -> None:
 
     from casadi_gnc.problem_files import allocating
 
+    allocator.load_all()
     rows = len(allocator.case.row_scale)
     names = ",".join(f"u{i}" for i in range(1, rows + 1))
 

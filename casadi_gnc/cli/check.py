@@ -20,9 +20,8 @@ def check(
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
     from casadi_gnc.checks import worst
-    from casadi_gnc.problem_files.checking import check_file
 
-    title, found = check_file(problem, scheme)
+    title, found = _checked(problem, scheme)
     if plot is not None:
         from casadi_gnc.reports.check_picture import draw
 
@@ -33,6 +32,25 @@ def check(
         _print(title, found, plot)
     if worst(found) == "fail":
         raise typer.Exit(1)
+
+
+def _checked(problem: str, schemes: list[str] | None) -> tuple[str, list[Check]]:
+    """Return title and checks; of a synthesis within its time limit."""
+    from casadi_gnc.cli.synthesize import TIME_LIMIT
+    from casadi_gnc.errors import ProblemError
+    from casadi_gnc.problem_files.checking import check_file
+    from casadi_gnc.problem_files.document import read
+
+    document = read(problem)
+    if document.data.get("kind") != "synthesis":
+        return check_file(problem, schemes)
+    from casadi_gnc.system.processes import within
+
+    try:
+        return within(TIME_LIMIT, check_file, problem)
+    except TimeoutError:
+        message = f"cannot be checked within {TIME_LIMIT:g} s; `casadi-gnc synthesize --time-limit` takes longer"
+        raise ProblemError(message, document.path.name) from None
 
 
 def _print_json(title: str, found: list[Check]) -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import io
 import os
 import sys
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
 
 import typer
 
@@ -32,6 +35,20 @@ from casadi_gnc.errors import GncError
 for _variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
+
+def _about_its_file(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that names its problem file in whatever is wrong."""
+
+    @wraps(command)
+    def named(*arguments: Any, **options: Any) -> None:
+        from casadi_gnc.problem_files.boundary import about
+
+        with about(options["problem"]):
+            command(*arguments, **options)
+
+    return named
+
+
 app = typer.Typer(
     name="casadi-gnc",
     help="Spacecraft guidance, navigation and control: from a problem file to flight C, with proof.",
@@ -40,13 +57,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.command("fly")(fly.fly)
+app.command("fly")(_about_its_file(fly.fly))
 app.command("campaign")(campaign.campaign)
 app.command("check")(check.check)
-app.command("allocate")(allocate.allocate)
-app.command("attainable")(attainable.attainable)
+app.command("allocate")(_about_its_file(allocate.allocate))
+app.command("attainable")(_about_its_file(attainable.attainable))
 app.command("synthesize")(synthesize.synthesize)
-app.command("generate")(generate.generate)
+app.command("generate")(_about_its_file(generate.generate))
 app.command("verify")(verify.verify)
 app.add_typer(bench.app, name="bench")
 app.add_typer(problems.app, name="problems")
@@ -70,6 +87,11 @@ def main() -> None:
         sys.stdout.flush()
     except GncError as error:
         _end(f"casadi-gnc: {error}", 2)
+    except SystemExit as ended:
+        if not isinstance(ended.__context__, BrokenPipeError):
+            raise
+        _silence()  # whoever read the answers has enough of them
+        sys.exit(0)
     except KeyboardInterrupt:
         _end("casadi-gnc: interrupted; files already complete were kept", 130)
     except BrokenPipeError:
@@ -94,8 +116,10 @@ def _say_what_code_runs() -> None:
 
 def _end(sentence: str, code: int) -> None:
     from casadi_gnc.system.text import terminal
+    from casadi_gnc.tables.wording import LONGEST, cut
 
-    print(terminal(sentence), file=sys.stderr)  # noqa: T201
+    lines = (cut(line, LONGEST) for line in terminal(sentence).split("\n"))
+    print("\n".join(lines), file=sys.stderr)  # noqa: T201
     sys.exit(code)
 
 

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from casadi_gnc.problem_files.synthesis_file import SynthesisCase
+
+#: Seconds that a synthesis may take unless more is asked for.
+TIME_LIMIT = 60.0
 
 
 def synthesize(
@@ -12,16 +18,23 @@ def synthesize(
     backend: Annotated[
         str | None, typer.Option(help="clarabel, scs, barrier or ./file.py:NAME, instead of the file's.")
     ] = None,
+    time_limit: Annotated[
+        float, typer.Option(min=0.0, help="Seconds after which the search ends without an answer; 0: none.")
+    ] = TIME_LIMIT,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """Find gains by a recipe and certify them; exit code 1 where there are none that can be used."""
-    from casadi_gnc.problem_files.synthesis_file import load_synthesis, synthesize
+    from casadi_gnc.problem_files.synthesis_file import answer_of, load_synthesis, out_of_time
     from casadi_gnc.synthesis import backends
+    from casadi_gnc.system.processes import within
 
     if backend is not None:
         backends.module(backend)
     case = load_synthesis(problem)
-    found = synthesize(case, backend)
+    try:
+        found = within(time_limit, answer_of, problem, backend, told=lambda: _tell(case, backend, time_limit))
+    except TimeoutError:
+        found = out_of_time(case, backend, time_limit)
     if json:
         import json as encoder
 
@@ -30,6 +43,16 @@ def synthesize(
         _print(case.title or case.name, found)
     if not found["certified"]:
         raise typer.Exit(1)
+
+
+def _tell(case: SynthesisCase, backend: str | None, seconds: float) -> None:
+    """Say on standard error what takes long."""
+    A = getattr(case.recipe, "A", None)
+    size = "" if A is None else f" for {len(A)} states"
+    given = getattr(case.recipe, "gamma", None) is not None
+    verb = "solving with the bound that is given" if given else "looking for gains"
+    until = f"; ends after {seconds:g} s (--time-limit)" if seconds else ""
+    typer.echo(f"{case.name}: {verb}{size} by {backend or case.backend}{until}", err=True)
 
 
 def _print(title: str, found: dict[str, Any]) -> None:

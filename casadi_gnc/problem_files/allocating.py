@@ -7,6 +7,7 @@ import re
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,10 @@ class CaseAllocator:
         self.case = case
         self._accuracy: Accuracy = accuracy
         self._allocator = Allocator(case.problem, backend, accuracy=accuracy)
+
+    def load_all(self) -> None:
+        """Import what is imported when it is first needed, so that no command of a stream waits for it."""
+        import_module("scipy.optimize")  # certificates of answers that are no solver's
 
     def solve(self, command: np.ndarray) -> Answer:
         """Return the answer to a command (R,) in its own unit; unallocated effort is in that unit too."""

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import os
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
+import casadi_gnc
 from casadi_gnc.errors import GncError, ProblemError
 from casadi_gnc.problem_files.document import Document, read
 from casadi_gnc.problem_files.toml_text import extreme
@@ -23,7 +25,8 @@ from casadi_gnc.problem_files.toml_text import extreme
 _OF_NUMBERS = (ArithmeticError, np.linalg.LinAlgError, MemoryError, RecursionError)
 #: What libraries raise for numbers that they cannot take, where the innermost code is theirs.
 _OF_LIBRARIES = (ValueError, RuntimeError, TypeError)
-_LIBRARIES = ("numpy", "scipy", "casadi", "clarabel", "scs", "proxsuite", "qpsolvers", "daqp")
+_LIBRARIES = {"numpy", "scipy", "casadi", "clarabel", "scs", "proxsuite", "qpsolvers", "daqp"}
+_OWN = str(Path(casadi_gnc.__file__).parent) + os.sep
 #: Magnitude beyond which a number is named as the likely cause.
 _LARGE = 1e12
 
@@ -32,11 +35,12 @@ _LARGE = 1e12
 def about(problem: str | Path | Document) -> Iterator[None]:
     """Name the file in whatever is wrong inside; what is raised about numbers becomes a `ProblemError` about them.
 
-    NumPy's warnings of the same are silent inside: statuses and checks tell what is not finite.
+    Warnings of the same by NumPy and SciPy are silent inside: statuses and checks tell what is not finite.
     """
     name = problem.path.name if isinstance(problem, Document) else Path(problem).name
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)
             yield
     except ProblemError:
         raise
@@ -53,8 +57,8 @@ def about(problem: str | Path | Document) -> Iterator[None]:
 def _is_of_a_library(error: BaseException) -> bool:
     """Return whether the innermost code that an error came from is that of a library below."""
     frames = traceback.extract_tb(error.__traceback__)
-    parts = set(frames[-1].filename.split(os.sep)) if frames else set()
-    return frames[-1].filename.startswith("<") or any(name in parts for name in _LIBRARIES)
+    last = frames[-1].filename if frames else _OWN
+    return not last.startswith(_OWN) and (last.startswith("<") or not _LIBRARIES.isdisjoint(last.split(os.sep)))
 
 
 def _sentence(document: Document, error: BaseException) -> ProblemError:

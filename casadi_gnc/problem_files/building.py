@@ -218,5 +218,10 @@ def _about_law(error: Exception, law: type[Law]) -> MisfitError:
     from casadi_gnc import guests
     from casadi_gnc.errors import GncError
 
-    told = str(error) if isinstance(error, GncError) else f"{law.__name__} cannot be made: {guests.told(error)}"
+    if isinstance(error, GncError):
+        told = str(error)
+    elif law.__module__.startswith("casadi_gnc."):
+        told = f"{law.__name__} cannot be made of these gains: they overflow, or leave a matrix without an inverse"
+    else:
+        told = f"{law.__name__} cannot be made: {guests.told(error)}"
     return MisfitError(told, "law")

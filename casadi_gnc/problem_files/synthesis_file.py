@@ -34,6 +34,9 @@ class SynthesisModel(Part):
     recipe: dict[str, Any] = Field(description="type names the recipe, the other keys are its own")
 
 
+_SINGULAR = "on the way a matrix of the recipe was singular to rounding; look for inputs, outputs or units far apart"
+
+
 @dataclass(frozen=True, eq=False)
 class SynthesisCase:
     """Hold what a synthesis file describes: the recipe with its matrices, and the back end."""
@@ -91,6 +94,8 @@ def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
             found = case.recipe.run(backend or case.backend)
         except SynthesisError as error:
             raise ProblemError(str(error), case.document.place(("recipe",))) from None
+        except np.linalg.LinAlgError:
+            return _unanswered(case, backend, f"No answer: {_SINGULAR}")
     if isinstance(found, LmiAnswer):
         return {"problem": case.name, **_inequalities(found)}
     data: dict[str, Any] = {"problem": case.name, **_inequalities(found.lmis)}
@@ -118,6 +123,36 @@ def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
     if found.ratios is not None:
         data["stable_ratios"] = [_finite(end) for end in found.ratios]
     return data
+
+
+def answer_of(problem: str | Path, backend: str | None = None) -> dict[str, Any]:
+    """Return what `synthesize` returns for a file, given by path or shipped name."""
+    return synthesize(load_synthesis(problem), backend)
+
+
+def out_of_time(case: SynthesisCase, backend: Any, seconds: float) -> dict[str, Any]:
+    """Return what is known where the search was ended after some seconds: nothing, in the form of `synthesize`."""
+    return _unanswered(
+        case,
+        backend,
+        f"No answer within {seconds:g} s: neither gains nor a proof that there are none. Give more time by "
+        "--time-limit, another back end, or a bound on the norm instead of the smallest",
+    )
+
+
+def _unanswered(case: SynthesisCase, backend: Any, sentence: str) -> dict[str, Any]:
+    named = backend or case.backend
+    return {
+        "problem": case.name,
+        "status": "UNDECIDED",
+        "sentence": sentence,
+        "certified": False,
+        "gains": {},
+        "backend": named if isinstance(named, str) else str(getattr(named, "__name__", "")),
+        "conflict": [],
+        "multipliers": {},
+        "constraints": [],
+    }
 
 
 def _inequalities(answer: Any) -> dict[str, Any]:

@@ -11,10 +11,17 @@ import os
 import signal
 import sys
 import threading
+import time
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import connection, get_context, parent_process
+from typing import Any
+
+from casadi_gnc.errors import GncError
 
 _PR_SET_PDEATHSIG = 1
+#: Seconds that nobody minds to wait without being told why.
+_SOON = 2.0
 
 
 def pool(processes: int) -> ProcessPoolExecutor:
@@ -27,6 +34,60 @@ def pool(processes: int) -> ProcessPoolExecutor:
     return ProcessPoolExecutor(
         processes, mp_context=get_context("spawn"), initializer=_leave_with_pool, initargs=(os.getpid(),)
     )
+
+
+def within(seconds: float, work: Callable[..., Any], *given: Any, told: Callable[[], Any] | None = None) -> Any:
+    """Return what a function makes of what is given, computed by a fresh interpreter that is ended after a time.
+
+    Code of libraries cannot be interrupted otherwise. For programs: whoever calls this at the top of a script of their
+    own needs a guard, as every script that starts interpreters does.
+
+    Parameters
+    ----------
+    seconds : after which there is no answer, 0 for no limit.
+    work, given : a function of a module, and its arguments; both are pickled.
+    told : called once, when an answer takes longer than some seconds.
+
+    Raises
+    ------
+    TimeoutError
+        Where there was no answer in time.
+    GncError
+        What the function raised.
+    OSError
+        Where the interpreter ended without an answer.
+    """
+    context = get_context("spawn")
+    here, there = context.Pipe(duplex=False)
+    worker = context.Process(target=_answer, args=(there, os.getpid(), work, given), daemon=True)
+    worker.start()
+    there.close()
+    try:
+        began = time.monotonic()
+        if told is not None and not here.poll(min(_SOON, seconds or _SOON)):
+            told()
+        left = None if not seconds else max(0.0, seconds - (time.monotonic() - began))
+        if not here.poll(left):
+            raise TimeoutError
+        try:
+            is_answer, found = here.recv()
+        except EOFError:
+            raise OSError("the process that computed ended without an answer; is there enough memory?") from None
+    finally:
+        worker.kill()
+        worker.join()
+        here.close()
+    if not is_answer:
+        raise found
+    return found
+
+
+def _answer(there: connection.Connection, parent: int, work: Callable[..., Any], given: tuple[Any, ...]) -> None:
+    _leave_with_pool(parent)
+    try:
+        there.send((True, work(*given)))
+    except GncError as error:
+        there.send((False, type(error)(str(error))))
 
 
 def leave_with_parent(parent: int) -> None:

@@ -1,5 +1,6 @@
 """`casadi-gnc allocate` as its users run it: tables, streams, interruptions."""
 
+import contextlib
 import csv
 import json
 import os
@@ -118,6 +119,20 @@ def test_reader_that_leaves_and_ctrl_c_end_cleanly():
     assert len(done.stdout.splitlines()) == 2
     assert "Traceback" not in done.stderr
     with subprocess.Popen(
+        [*PROGRAM, CASE, "--stream"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as peer:  # fmt: skip
+        peer.stdin.write("1e-4,0,0\n")
+        peer.stdin.flush()
+        peer.stdout.readline()
+        peer.stdout.close()
+        with contextlib.suppress(BrokenPipeError):
+            peer.stdin.write("1e-4,0,0\n")
+            peer.stdin.close()
+        assert peer.wait(timeout=60) == 0
+        errors = peer.stderr.read()
+        assert "OPTIMAL" in errors
+        assert "Exception" not in errors
+    with subprocess.Popen(
         [*PROGRAM, CASE, "--stream"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as peer:  # fmt: skip
@@ -130,6 +145,23 @@ def test_reader_that_leaves_and_ctrl_c_end_cleanly():
         assert peer.wait(timeout=60) == 130
         assert "Traceback" not in errors
         assert "1 OPTIMAL" in errors
+
+
+def test_nothing_is_imported_for_a_bad_command():
+    """The first command that is none is answered as soon as the next one."""
+    code = (
+        "import sys, numpy as np\n"
+        "from casadi_gnc.problem_files.allocating import CaseAllocator\n"
+        "from casadi_gnc.problem_files.allocation_file import load_allocation\n"
+        f"allocator = CaseAllocator(load_allocation({CASE!r}), 'online')\n"
+        "allocator.load_all()\n"
+        "allocator.solve(np.array([1e-4, 0, 0]))\n"
+        "before = set(sys.modules)\n"
+        "for command in ([np.nan, 0, 0], [1e300, 0, 0], [1.0, 0, 0]): allocator.solve(np.array(command))\n"
+        "print(sorted(set(sys.modules) - before))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.stdout == "[]\n", done.stderr
 
 
 def told(done: subprocess.CompletedProcess, message: str) -> None:

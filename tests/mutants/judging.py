@@ -9,7 +9,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mutants.mutating import mutant
+from mutating import mutant
 
 #: Processor time [s] beyond which a command counts as hanging, and the time for which one that says nothing is waited.
 MOST, PATIENCE = 20.0, 200.0
