@@ -21,7 +21,7 @@ from casadi_gnc.errors import GncError
 
 _PR_SET_PDEATHSIG = 1
 #: Seconds that nobody minds to wait without being told why.
-_SOON = 2.0
+_SOON = 5.0
 
 
 def pool(processes: int) -> ProcessPoolExecutor:

@@ -1,5 +1,6 @@
 """No worker outlives the process that started it. Truth: the system's own list of processes."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -63,3 +64,26 @@ def test_workers_end_with_their_pool(busy, tmp_path):
     for process in left:
         os.kill(process, signal.SIGKILL)
     assert left == []
+
+
+def test_what_takes_too_long_is_ended_with_its_process():
+    """Code that never comes back to Python, here a sleep of the C library, is ended as well; its process with it."""
+    from casadi_gnc.system.processes import within
+
+    assert within(60.0, abs, -3) == 3
+    began = time.monotonic()
+    with pytest.raises(TimeoutError):
+        within(1.0, time.sleep, 600.0)
+    assert time.monotonic() - began < 60.0
+    assert not [child for child in multiprocessing.active_children() if child.is_alive()]
+
+
+def test_what_is_raised_there_is_raised_here():
+    from casadi_gnc.errors import ProblemError
+    from casadi_gnc.problem_files.document import read
+    from casadi_gnc.system.processes import within
+
+    with pytest.raises(ProblemError, match="no problem file 'nowhere'"):
+        within(60.0, read, "nowhere")
+    with pytest.raises(OSError, match="ended without an answer"):
+        within(60.0, os._exit, 3)
