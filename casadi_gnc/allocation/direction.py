@@ -15,6 +15,7 @@ command, and the forces are those of least error. In both cases the status says 
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def least_angle(problem: AllocationProblem, command: np.ndarray, previous: np.nd
     ----------
     command : (R,), not zero. previous : (N,), forces of the last sample.
     """
-    import clarabel
+    clarabel: Any = import_module("clarabel")  # its names are not known to type checkers
 
     lower, upper = problem.box(previous)
     reach = np.maximum(np.abs(lower), np.abs(upper))

@@ -116,21 +116,22 @@ def _print(found: Campaign, confidence: float, json: bool) -> None:
     say(f"{summary['mission']}, {summary['scheme']}: {flew} flights of {summary['asked']} cases")
     for why, count in summary["why"].items():
         say(f"{count} cases refused: {why}")
-    percent = f"{100 * confidence:g} %"
-    table = Table(title=f"metrics, with bounds that hold at {percent}", title_justify="left")
-    table.add_column("")
-    shares = sorted({float(share) for one in summary["metrics"].values() for share in one["percentiles"]})
-    for share in shares:
-        table.add_column(f"{share:g} %", justify="right", overflow="fold")
-    table.add_column("none", justify="right")
-    table.add_column("worst case", justify="right")
+    title = f"what a share of all flights stays within, with bounds that hold at {100 * confidence:g} %"
+    table = Table(title=title, title_justify="left")
+    for name in ("", "share", "within", "bounds"):
+        table.add_column(name, justify="left" if name in ("", "bounds") else "right")
     for name, one in summary["metrics"].items():
         unit = f" [{one['unit']}]" if one["unit"] not in ("", "-") else ""
-        cells = [_bounded(one["percentiles"].get(f"{share:g}")) for share in shares]
-        worst = str(one["worst"][0]["case"]) if one["worst"] else ""
-        table.add_row(escape(name.replace("_", " ") + unit), *cells, str(one["without"]), worst)
+        for number, (share, found_one) in enumerate(one["percentiles"].items()):
+            value, low, high = (_shown(found_one[part]) for part in ("value", "low", "high"))
+            first = escape(name.replace("_", " ") + unit) if number == 0 else ""
+            table.add_row(first, f"{share} %", value, f"{low} to {high}")
+        table.add_section()
     if summary["metrics"]:
         console.print(table, soft_wrap=False)
+    for name, one in summary["metrics"].items():
+        if one["without"]:
+            say(f"{one['without']} flights have no {name.replace('_', ' ')}, which counts as the worst")
     for name, one in summary["requirements"].items():
         shown = one["shown"]
         bounds = f"{_percent(shown['low'])} to {_percent(shown['high'])}"
@@ -149,6 +150,9 @@ def _print(found: Campaign, confidence: float, json: bool) -> None:
         if drivers:
             told = ", ".join(f"{each['key']} ({each['rank_correlation']['value']:+.2f})" for each in drivers)
             say(f"{name.replace('_', ' ')} goes with {told}")
+    worst = [f"{name} of case {one['worst'][0]['case']}" for name, one in summary["metrics"].items()]
+    if worst:
+        say(f"the worst: {', '.join(worst)}")
     say(f"kept in {found.folder}; a case again: casadi-gnc fly {found.folder} --case worst:METRIC")
 
 
@@ -156,9 +160,6 @@ def _percent(share: float | None) -> str:
     return "?" if share is None else f"{100 * share:.6g} %"
 
 
-def _bounded(found: dict[str, float | None] | None) -> str:
-    """Return a percentile and its bounds: "5.1 (4.9 to 5.3)"."""
-    if found is None:
-        return ""
-    value, low, high = ("never" if found[name] is None else f"{found[name]:.4g}" for name in ("value", "low", "high"))
-    return value if value == low == high else f"{value} ({low} to {high})"
+def _shown(value: float | None) -> str:
+    """Return a number; what has no value, or no bound, is beyond all numbers."""
+    return "none" if value is None else f"{value:.4g}"
