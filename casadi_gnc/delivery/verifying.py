@@ -152,7 +152,7 @@ class _Bench:
             self.layout = Layout(tuple(Signal(one.name, one.size, one.unit) for one in self.anew.outputs))
         except (ValidationError, ValueError):
             raise PackageError(f"{folder} cannot be made again: its code left no answer of ours") from None
-        own = {*self.anew.files, kept, *about.problem.code, "README.md"}
+        own = {*self.anew.files, kept, *(path for path in about.problem.code if path.endswith(".py")), "README.md"}
         refuse_strangers([path for path in about.files if path not in own], folder)
         for path in self.anew.files:
             if not path.startswith("test/") and (folder / path).exists():
