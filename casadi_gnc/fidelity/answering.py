@@ -186,7 +186,8 @@ def _remembered(path: Path) -> dict[str, Any] | None:
 def _remember(path: Path, found: dict[str, Any]) -> None:
     """Keep an answer for the next time, where the cache can be written."""
     with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
+        for folder in (path.parent.parent, path.parent):  # the cache is its user's alone
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_beside(path, lambda place: place.write_text(json.dumps(found)))
 
 

@@ -170,8 +170,10 @@ def test_an_answer_that_is_not_as_it_was_kept_is_found_anew(kept, tmp_path, monk
 def test_any_number_is_remembered(number, tmp_path):
     from casadi_gnc.fidelity import answering
 
-    answering._remember(tmp_path / "a.json", {"values": {"value": number}})
-    assert repr(answering._remembered(tmp_path / "a.json")) == repr({"values": {"value": number}})
+    place = tmp_path / "cache" / "claims" / "a.json"
+    answering._remember(place, {"values": {"value": number}})
+    assert repr(answering._remembered(place)) == repr({"values": {"value": number}})
+    assert {folder.stat().st_mode & 0o777 for folder in place.parents[:2]} == {0o700}
 
 
 @pytest.mark.parametrize(
