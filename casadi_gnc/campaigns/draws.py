@@ -61,9 +61,9 @@ def words(seed: int, purpose: Purpose, cases: np.ndarray, count: int, part: int 
     check_seed(seed)
     case = np.asarray(cases, dtype=np.uint64)
     found = np.empty((len(case), count), dtype=np.uint64)
-    draw = np.uint64((int(purpose) << 24) | part)
+    draw = (int(purpose) << 24) | part
     for block in range(-(-count // 2)):
-        four = philox((np.uint64(block), case, draw, np.uint64(_WORD)), (seed & _WORD, seed >> 32))
+        four = philox((block, case, draw, _WORD), (seed & _WORD, seed >> 32))
         for half in range(min(2, count - 2 * block)):
             found[:, 2 * block + half] = (four[2 * half] << np.uint64(32)) | four[2 * half + 1]
     return found
