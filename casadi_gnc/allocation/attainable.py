@@ -33,7 +33,7 @@ doi:10.1016/j.ast.2019.105572, whose +-1.5e-3 N m box is not attainable: the nom
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from math import comb
 from typing import Any
 
@@ -48,129 +48,12 @@ from casadi_gnc.allocation.attainable_sets import (
     overlap,
 )
 from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.allocation.reach import Attainable, Reach
 from casadi_gnc.allocation.zonotope import Zonotope
 from casadi_gnc.errors import AllocationError
 
 #: Most subsets of actuators looked at over all samples; some seconds of work.
 _MOST_WORK = 300_000
-
-
-@dataclass(frozen=True, eq=False)
-class Reach:
-    """Hold how far one set reaches; K directions, R rows of effort.
-
-    Parameters
-    ----------
-    kind : which set.
-    box : (R,), half-widths of the largest box of the proportions asked for [effort]; negative where
-        the origin is outside, NaN for an empty set.
-    sphere : radius of the largest sphere about the origin [effort], sign as `box`; NaN too where there are
-        too many faces to list.
-    lines : (K, 2), least and largest s with s times the direction attainable; NaN where the line misses.
-    is_empty : whether no effort at all is attainable in this sense.
-    """
-
-    kind: SetKind
-    box: np.ndarray
-    sphere: float
-    lines: np.ndarray
-    is_empty: bool
-
-    @property
-    def margins(self) -> np.ndarray:
-        """Largest s along every direction, (K,); negative where only the opposite side is attainable."""
-        return self.lines[:, 1]
-
-    @property
-    def holds_origin(self) -> bool:
-        """Whether the actuators can make zero effort in this sense."""
-        return bool(np.all(self.box >= 0))
-
-    def sentence(self, unit: str = "N m") -> str:
-        """Return one line for the reader."""
-        if self.is_empty:
-            return f"{self.kind.value}: no effort at all is attainable"
-        if not self.holds_origin:
-            near = f"a box must grow to ±{_list(-self.box)} {unit} to touch what is"
-            return f"{self.kind.value}: not even zero effort is attainable; {near}"
-        if not np.any(self.box):
-            return f"{self.kind.value}: no box about zero is attainable (zero is on the boundary, or the set is flat)"
-        return f"{self.kind.value}: the largest box is ±{_list(self.box)} {unit}"
-
-    def summary(self) -> dict[str, Any]:
-        """Return plain numbers for JSON; what does not exist is None."""
-        return {
-            "meaning": self.kind.value,
-            "is_empty": self.is_empty,
-            "holds_origin": self.holds_origin,
-            "box": _plain(self.box),
-            "sphere": _plain(self.sphere),
-            "lines": _plain(self.lines),
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class Attainable:
-    """Hold what `attainable` found; every number in the unit of the effort (for torque [N m]).
-
-    Parameters
-    ----------
-    wanted : (R,), half-widths of the virtual-control box asked about, or None.
-    directions : (K, R), of the margins.
-    nominal, each_vertex, common_forces : the three sets, each inside the one before.
-    sampled : least values over the vertices *and* `samples` points inside the uncertainty: still an upper
-        bound for the whole uncertainty, of which `common_forces` is the lower. None without uncertainty.
-    samples, seed : how many points were drawn, and from which seed.
-    notes : sentences on what could not be computed.
-    """
-
-    wanted: np.ndarray | None
-    directions: np.ndarray
-    nominal: Reach
-    each_vertex: Reach
-    common_forces: Reach
-    sampled: Reach | None
-    samples: int
-    seed: int
-    notes: tuple[str, ...] = ()
-
-    @property
-    def reaches(self) -> tuple[Reach, ...]:
-        """All sets, the largest first."""
-        return tuple(r for r in (self.nominal, self.each_vertex, self.sampled, self.common_forces) if r is not None)
-
-    def shares(self) -> dict[SetKind, float]:
-        """Return the attainable share of the wanted box in every set: 1 or more where it is attainable."""
-        if self.wanted is None:
-            raise AllocationError("no virtual-control box was asked about; give `wanted`")
-        axis = int(np.argmax(self.wanted))
-        return {reach.kind: float(reach.box[axis] / self.wanted[axis]) for reach in self.reaches}
-
-    def sentences(self, unit: str = "N m") -> tuple[str, ...]:
-        """Return the verdict on the wanted box, then one line per set, then the notes."""
-        lines = []
-        if self.wanted is not None:
-            share = self.shares()[SetKind.NOMINAL]
-            verdict = "is" if share >= 1 else "is not"
-            why = f"the largest box of its proportions is {100 * share:.3g} % of it"
-            why = why if share >= 0 else "not even zero effort is"
-            lines.append(f"the box ±{_list(self.wanted)} {unit} {verdict} attainable with the nominal geometry: {why}")
-        return (*lines, *(reach.sentence(unit) for reach in self.reaches), *self.notes)
-
-    def summary(self) -> dict[str, Any]:
-        """Return plain numbers and sentences for JSON."""
-        shares = None
-        if self.wanted is not None:
-            shares = {kind.name.lower(): _plain(share) for kind, share in self.shares().items()}
-        return {
-            "wanted": None if self.wanted is None else _plain(self.wanted),
-            "share_of_wanted": shares,
-            "directions": _plain(self.directions),
-            "sets": {reach.kind.name.lower(): reach.summary() for reach in self.reaches},
-            "samples": self.samples,
-            "seed": self.seed,
-            "sentences": list(self.sentences()),
-        }
 
 
 def attainable(
@@ -181,8 +64,9 @@ def attainable(
     samples: int = 200,
     seed: int = 0,
     previous: Any = None,
+    units: Sequence[str] | None = None,
 ) -> Attainable:
-    """Return largest box, inscribed sphere and margins of the three attainable sets.
+    """Return largest box, inscribed spheres and margins of the three attainable sets.
 
     Parameters
     ----------
@@ -193,6 +77,7 @@ def attainable(
         Dirichlet weights, half of them crowded towards faces and edges.
     seed : of the samples.
     previous : (N,), see `attainable_sets`.
+    units : of the R rows, "N m"; rows of one unit are of one kind, and each kind has a sphere of its own.
 
     Raises
     ------
@@ -203,7 +88,7 @@ def attainable(
     --------
     >>> import numpy as np
     >>> problem = AllocationProblem(np.diag([1.0, 2.0]), lower=-1.0, upper=1.0)
-    >>> found = attainable(problem, wanted=2.0)
+    >>> found = attainable(problem, wanted=2.0, units=("N m", "N m"))
     >>> found.nominal.box.tolist(), found.sentences()[0]
     ([1.0, 1.0], 'the box ±2 N m is not attainable with the nominal geometry: \
 the largest box of its proportions is 50 % of it')
@@ -211,31 +96,40 @@ the largest box of its proportions is 50 % of it')
     rows = len(problem.effectiveness)
     if samples < 0:
         raise AllocationError(f"samples is {samples}, expected 0 or more")
+    told = ("",) * rows if units is None else tuple(units)
+    if len(told) != rows:
+        raise AllocationError(f"units has {len(told)} entries, expected {rows}, one a row")
     box = None if wanted is None else half_widths(wanted, rows)
     shape = np.ones(rows) if box is None else box
     along = np.eye(rows) if directions is None else np.atleast_2d(np.asarray(directions, dtype=float))
     sets = attainable_sets(problem, previous=previous)
     notes: list[str] = []
-    nominal, vertices, common = (_reach(one, shape, along, notes) for one in sets)
-    drawn = samples if problem.is_robust and not np.isnan(nominal.sphere) else 0
+    nominal, vertices, common = (_reach(one, shape, along, told, notes) for one in sets)
+    drawn = samples if problem.is_robust and not any(np.isnan(each) for each in nominal.spheres.values()) else 0
     affordable = max(1, _MOST_WORK // comb(problem.count, min(rows, problem.count) - 1))
     if drawn > affordable:
         notes.append(
             f"{affordable} samples of the uncertainty were tried instead of {drawn}: that many faces take long"
         )
         drawn = affordable
-    inside = _sampled(problem, sets[1], shape, along, drawn, seed, previous) if drawn else None
-    return Attainable(box, along, nominal, vertices, common, inside, drawn, seed, tuple(dict.fromkeys(notes)))
+    inside = _sampled(problem, sets[1], shape, along, told, drawn, seed, previous) if drawn else None
+    return Attainable(box, along, nominal, vertices, common, inside, drawn, seed, told, tuple(dict.fromkeys(notes)))
 
 
-def _reach(one: AttainableSet, shape: np.ndarray, along: np.ndarray, notes: list[str]) -> Reach:
+def _reach(one: AttainableSet, shape: np.ndarray, along: np.ndarray, units: tuple[str, ...], notes: list[str]) -> Reach:
     size, lines = one.box(shape), np.array([one.line(direction) for direction in along])
     try:
-        sphere = one.sphere()
+        spheres = _spheres(one, units)
     except AllocationError as error:
         notes.append(str(error))
-        sphere = float("nan")
-    return Reach(one.kind, _widths(size, shape), sphere, lines, bool(np.isnan(size)))
+        spheres = dict.fromkeys(units, float("nan"))
+    return Reach(one.kind, _widths(size, shape), spheres, lines, bool(np.isnan(size)), units)
+
+
+def _spheres(one: AttainableSet, units: tuple[str, ...]) -> dict[str, float]:
+    """Return the radius for each kind of row, by its unit."""
+    rows = {unit: [row for row, each in enumerate(units) if each == unit] for unit in units}
+    return {unit: one.sphere(own if len(rows) > 1 else slice(None)) for unit, own in rows.items()}
 
 
 def _sampled(
@@ -243,6 +137,7 @@ def _sampled(
     vertices: AttainableSet,
     shape: np.ndarray,
     along: np.ndarray,
+    units: tuple[str, ...],
     samples: int,
     seed: int,
     previous: Any,
@@ -258,21 +153,10 @@ def _sampled(
     one = AttainableSet(SetKind.SAMPLED, tuple(parts))
     lines = [overlap([part.halfspaces.line(direction) for part in parts]) for direction in along]
     size = one.box_of_faces(shape)
-    return Reach(one.kind, _widths(size, shape), one.sphere(), np.array(lines), bool(np.isnan(size)))
+    widths = _widths(size, shape)
+    return Reach(one.kind, widths, _spheres(one, units), np.array(lines), bool(np.isnan(size)), units)
 
 
 def _widths(size: float, shape: np.ndarray) -> np.ndarray:
     """Return the half-widths; an axis of no width keeps none, however far away the set is."""
     return np.where(shape > 0, size * np.where(shape > 0, shape, 1.0), size if np.isnan(size) else 0.0)
-
-
-def _list(values: np.ndarray) -> str:
-    texts = [f"{value:.3g}" for value in values]
-    return texts[0] if len(set(texts)) == 1 else "(" + ", ".join(texts) + ")"
-
-
-def _plain(values: Any) -> Any:
-    """Return nested lists of numbers; what is not finite becomes None."""
-    if np.ndim(values):
-        return [_plain(value) for value in values]
-    return float(values) if np.isfinite(values) else None

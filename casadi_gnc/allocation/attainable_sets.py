@@ -65,8 +65,10 @@ class AttainableSet:
         p = half_widths(proportions, len(self.parts[0].centre))
         return self._signed(np.min([part.halfspaces.box(p) for part in self.parts]), p)
 
-    def sphere(self) -> float:
-        """Return the radius of the largest sphere about the origin, from the faces; all rows share one unit.
+    def sphere(self, rows: Any = slice(None)) -> float:
+        """Return the radius of the largest sphere about the origin, from the faces, in the plane of some rows.
+
+        These share one unit; the others stay zero.
 
         Negative where the origin is outside: minus the largest component of the nearest effort, a lower
         bound of the distance. NaN: the set is empty.
@@ -76,8 +78,10 @@ class AttainableSet:
         AllocationError
             Where a part has too many faces to list.
         """
-        radius = np.min([part.halfspaces.sphere() for part in self.parts])
-        return self._signed(radius, np.ones(len(self.parts[0].centre)))
+        radius = np.min([part.halfspaces.sphere(rows) for part in self.parts])
+        shape = np.zeros(len(self.parts[0].centre))
+        shape[rows] = 1.0
+        return self._signed(radius, shape)
 
     def _signed(self, size: Any, proportions: np.ndarray) -> float:
         """Return a size, or what there is to say where the origin is not in the set (size negative or NaN)."""

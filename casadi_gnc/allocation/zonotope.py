@@ -32,6 +32,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from math import comb
+from typing import Any
 
 import numpy as np
 
@@ -62,12 +63,15 @@ class Halfspaces:
     offsets: np.ndarray
     is_empty: bool = False
 
-    def sphere(self) -> float:
-        """Return the radius of the largest sphere about the origin inside the set.
+    def sphere(self, rows: Any = slice(None)) -> float:
+        """Return the radius of the largest sphere about the origin inside the set, in the plane of some rows.
 
         Negative: the origin is outside, and at least that far from the set. NaN: the set is empty.
         """
-        return float("nan") if self.is_empty else float(self.offsets.min(initial=np.inf))
+        if self.is_empty:
+            return float("nan")
+        reach = np.linalg.norm(self.normals[:, rows], axis=1)
+        return float(_ratios(self.offsets, np.where(reach > _TINY, reach, 0.0), self.offsets).min(initial=np.inf))
 
     def box(self, proportions: np.ndarray) -> float:
         """Return the largest s for which the box |u_i| <= s p_i is inside, negative or NaN as for `sphere`."""

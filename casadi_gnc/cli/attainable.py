@@ -15,7 +15,7 @@ def attainable(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
-    """Report largest box, inscribed sphere and axis margins of three attainable sets.
+    """Report largest box, inscribed spheres and axis margins of three attainable sets.
 
     The sets: nominal geometry; every error with forces of its own; one choice of forces for all
     errors. The box that the file's torque_limit_N_m asks for is judged against each.
@@ -27,18 +27,17 @@ def attainable(
     case = load_allocation(problem)
     if plot is not None:
         prepare_folder(plot.parent)
-    found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed)
+    found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed, units=case.units)
     if json:
         import json as encoder
 
         typer.echo(encoder.dumps({"problem": case.name, **found.summary()}, indent=2))
     else:
         typer.echo(case.title or case.name)
-        for sentence in found.sentences("N m"):
+        for sentence in found.sentences():
             typer.echo(sentence)
         for reach in found.reaches:
-            axes = ", ".join(f"{low:.3g} to {high:.3g}" for low, high in reach.lines)
-            typer.echo(f"{reach.kind.value}: sphere {reach.sphere:.3g} N m; along the axes {axes} N m")
+            typer.echo(reach.along(found.directions))
     if plot is not None:
         from casadi_gnc.allocation.attainable_plots import plot_slices
 

@@ -40,6 +40,7 @@ class AllocationCase:
     row_scale : (R,), factor to put on a command before it is allocated.
     torque_limit : box that a law may ask for, (R,), or None.
     keep_direction, least_force : see the file's options.
+    units : of the rows of effort, "" where a file does not say.
     doubts : sentences on what a file may not mean as it says it.
     """
 
@@ -53,6 +54,7 @@ class AllocationCase:
     keep_direction: bool
     least_force: float | None
     doubts: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> list[str]:
@@ -126,6 +128,9 @@ def _case(model: AllocationModel, name: str, complaints: Complaints) -> Allocati
         with complaints.about("options", "priorities"):
             scale = axis_scale(options.priorities, options.priority_ratio)
             problem = by_priority(problem, options.priorities, options.priority_ratio)
+    units = ("N m",) * rows if model.matrices is None else tuple(model.matrices.units or ("",) * rows)
+    if len(units) != rows:
+        complaints.add(("matrices", "units"), f"{len(units)} units, expected {rows}, one a row")
     limit = None if model.torque_limit_N_m is None else np.array(model.torque_limit_N_m)
     if limit is not None and len(limit) != rows:
         complaints.add(("torque_limit_N_m",), f"torque_limit_N_m has {len(limit)} entries, expected {rows}")
@@ -141,6 +146,7 @@ def _case(model: AllocationModel, name: str, complaints: Complaints) -> Allocati
         options.keep_direction,
         options.least_force_N,
         doubts,
+        units,
     )
 
 

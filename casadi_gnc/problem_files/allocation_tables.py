@@ -33,6 +33,9 @@ class Matrices(Part):
     """Effectiveness and uncertainty as plain matrices."""
 
     effectiveness: Table
+    units: list[Annotated[str, Field(max_length=12)]] | None = Field(
+        default=None, description="of the rows of effort, for what is printed; rows of one unit are of one kind"
+    )
     coupling: Table | None = None
     errors: Annotated[list[Table], Field(min_length=1, max_length=_MOST_VERTICES)] | None = None
     lower: Column | float

@@ -98,7 +98,7 @@ def cube_distance(points: np.ndarray) -> float:
 
 def test_huang_2020():
     """An independent evaluation of the paper's torque box, to its printed digits."""
-    found = attainable(huang(), 1.5e-3)
+    found = attainable(huang(), 1.5e-3, units=("N m",) * 3)
     assert np.allclose(found.nominal.box, 5.16e-4, atol=0.5e-6)
     assert np.allclose(found.each_vertex.box, 4.93e-4, atol=0.5e-6)
     assert np.allclose(found.common_forces.box, 3.55e-4, atol=0.5e-6)
@@ -196,7 +196,7 @@ def test_off_its_own_plane():
 
 
 def test_actuators_that_cannot_be_shut():
-    found = attainable(AllocationProblem(np.array([[1.0]]), 1.0, 2.0), 1.0, directions=[[1.0], [-1.0]])
+    found = attainable(AllocationProblem(np.array([[1.0]]), 1.0, 2.0), 1.0, directions=[[1.0], [-1.0]], units=["N m"])
     assert found.nominal.box == pytest.approx([-1.0])
     assert found.nominal.sphere == pytest.approx(-1.0)
     assert np.allclose(found.nominal.lines, [[1, 2], [-2, -1]], **CLOSE)
@@ -484,3 +484,23 @@ def test_pictures(tmp_path):
         plot_slices(huang(), tmp_path / "three.doc")
     with pytest.raises(AllocationError, match="2 names"):
         plot_slices(huang(), tmp_path / "three.png", axes_names=("x", "y"))
+
+
+def test_forces_and_torques_have_spheres_of_their_own():
+    """Forces of at most 2 and 3 N, torques of at most 0.1 and 0.2 N m, by actuators that are shared.
+
+    Each actuator of the first pair pushes along axis 1 and turns about axis 3 by an arm of 0.05 m, one this way and one
+    that: alone, axis 1 makes 2 N with both and axis 3 0.05 m x 2 N = 0.1 N m.
+    """
+    matrix = np.array([[1.0, 1, 0, 0], [0, 0, 3, 0], [0.05, -0.05, 0, 0], [0, 0, 0, 0.2]])
+    problem = AllocationProblem(matrix, lower=-1.0, upper=1.0)
+    found = attainable(problem, units=("N", "N", "N m", "N m"))
+    assert found.nominal.spheres == pytest.approx({"N": 2.0, "N m": 0.1}, rel=1e-12)
+    assert np.isnan(found.nominal.sphere)
+    told = found.nominal.along(found.directions)
+    assert "spheres of 2 N, 0.1 N m; along the axes -2 to 2 N, -3 to 3 N, -0.1 to 0.1 N m, -0.2 to 0.2 N m" in told
+    (alone,) = attainable(problem).nominal.spheres.values()  # nobody says that they differ
+    # Both at once share the first pair: |f1| / 2 + |t3| / 0.1 <= 1, a plane at 1 / |(1/2, 10)| from zero.
+    assert alone == pytest.approx(1 / np.hypot(0.5, 10.0), rel=1e-12)
+    with pytest.raises(AllocationError, match="units has 1 entries, expected 4"):
+        attainable(problem, units=("N",))

@@ -119,9 +119,14 @@ def wrong(found: dict | None, path: Path) -> list[tuple[str, str]]:
         if said := WORDS.search(line):
             faults.append((f"a library's words: {said[0]}", line))
     if found["code"] == 2:
-        if not told or not told[0].startswith("casadi-gnc: "):
+        begin = next((k for k, line in enumerate(told) if line.startswith("casadi-gnc: ")), None)
+        if begin is None:
             faults.append(("no sentence", found["err"][-2000:]))
-        faults += [("names no file", line) for line in told if path.name not in line and str(path.parent) not in line]
+        # Before it there may be warnings, and what takes long.
+        sentences = told[begin:]
+        faults += [
+            ("names no file", line) for line in sentences if path.name not in line and str(path.parent) not in line
+        ]
     if said := re.search(r"CasADi - |Warning:", found["out"]):
         faults.append((f"a library's words: {said[0]}", found["out"][:2000]))
     return faults
