@@ -13,8 +13,8 @@ from pathlib import Path
 from casadi_gnc.system.files import flush
 
 _AT_FDCWD, _RENAME_EXCHANGE, _RENAME_SWAP = -100, 2, 2
-#: What a system says that cannot exchange names, or not on this disk.
-_CANNOT = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP)
+#: What a system says that cannot exchange names, or not on this disk, or not a folder of a container's image (EXDEV).
+_CANNOT = (errno.ENOSYS, errno.EINVAL, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EXDEV)
 
 
 def replace_folder(fresh: Path, folder: Path, ours: Iterable[str], last: str) -> None:
