@@ -170,6 +170,8 @@ def test_a_monitor_says_met_or_not_met_only_of_what_stays_so():
         ("always(sqrt(v[3]) <= 1)", -math.inf),
         ("always(not sqrt(v[3]) <= 1)", -math.inf),
         ("always(v[1] / v[2] > 1)", math.inf),
+        ("always[1, 1](2 <= 3)", 1.0),
+        ("eventually[2, 3](2 <= 3)", -math.inf),
         ("always(v[2] / abs(v[2]) > 1)", -math.inf),
     ],
 )

@@ -110,7 +110,7 @@ class Judge:
     def __post_init__(self) -> None:
         column = self.row.symbol("row")
         self._bound = self.requirement.bind(self.row, column, self.period)
-        self._margins = margins_of(self._bound, column)
+        self._margins = margins_of(self._bound, self.row, column)
 
     def take(self, rows: np.ndarray) -> None:
         """Note the next samples, (K, columns)."""

@@ -246,15 +246,20 @@ def robustness_of(requirement: Requirement, layout: Layout, samples: np.ndarray,
     """
     column = layout.symbol("row")
     bound = requirement.bind(layout, column, period)
-    return unbounded(evaluating.robustness(bound.tree, margins_of(bound, column)(samples))[0])
+    return unbounded(evaluating.robustness(bound.tree, margins_of(bound, layout, column)(samples))[0])
 
 
-def margins_of(bound: Bound, column: ca.SX) -> Any:
+def margins_of(bound: Bound, layout: Layout, column: ca.SX) -> Any:
     """Return the function from rows, (K, columns), to the margins of a formula's comparisons, (M, K)."""
-    tape = ca.Function("margins", [column], [ca.densify(ca.vertcat(*bound.margins))])
+    read = [i for name in sorted(bound.names) for i in range(*layout.place(name).indices(layout.size))]
+    tape = ca.Function("margins", [column[read]], [ca.densify(ca.vertcat(*bound.margins))])
 
     def evaluate(samples: np.ndarray) -> np.ndarray:
-        return np.array(ca.DM(tape(ca.DM(samples.T)))) if len(samples) else np.zeros((len(bound.margins), 0))
+        shape = (len(bound.margins), len(samples))
+        if not len(samples):
+            return np.zeros(shape)
+        # Of comparisons of constants alone CasADi returns one column.
+        return np.broadcast_to(np.array(ca.DM(tape(ca.DM(np.ascontiguousarray(samples[:, read].T))))), shape)
 
     return evaluate
 
