@@ -51,6 +51,7 @@ def listing(folder):
         ("gnc_math", "belongs to the runtime"),
         ("slew_alloc", "belongs to the allocator of a package 'slew'"),
         ("slew_allocate_point", "belongs to the allocator of a package 'slew'"),
+        ("slew_monitor", "belongs to the monitor of a package 'slew'"),
         ("SLEW", "has capital letters: .* take --name slew$"),
         ("Memcpy", "has capital letters"),
         ("slew_", "ends with an underscore"),
