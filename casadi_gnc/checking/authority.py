@@ -22,12 +22,13 @@ _SPANNED = 1e-9
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the share of the virtual-control box that is made, and what standing still at the target takes."""
+    span = spanned(mission, scheme)
     yield Check(
         "authority.span",
-        spanned(mission, scheme),
+        span,
         0.0,
         "-",
-        "fail",
+        "note" if np.isnan(span) else "fail",
         "The actuators cannot make some effort at all, however little of it: the craft drifts off that way.",
         "Add or turn an actuator so that every direction of effort can be made.",
         "least share of what all actuators make of a row of effort at most, with the other rows at zero",
@@ -92,7 +93,7 @@ def spanned(mission: Mission, scheme: Scheme) -> float:
     rows = len(scaled)
     corners = np.vstack([np.eye(rows), -np.eye(rows)])
     least = float(programs.largest_shares(scaled, corners, lower, upper).min())
-    return least if least > _SPANNED else 0.0
+    return least if least > _SPANNED or np.isnan(least) else 0.0
 
 
 def attainable_share(mission: Mission, scheme: Scheme) -> float:

@@ -17,6 +17,7 @@ import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
+from casadi_gnc.checking import programs
 from casadi_gnc.checking.authority import believed
 from casadi_gnc.checking.linear import loop_at, target_state
 from casadi_gnc.checks import Check
@@ -41,12 +42,13 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         # A law that does not know the funnel promises nothing about it: a baseline that is watched.
         otherwise = "fail" if scheme.law.keeps(funnel.signal) else "note"
         if funnel.signal in mission.truth.state and funnel.signal in mission.target:
+            share = needed_share(mission, scheme, funnel)
             yield Check(
                 f"funnel.authority.{funnel.signal}",
-                needed_share(mission, scheme, funnel),
+                share,
                 _CERTAIN,
                 "-",
-                otherwise,
+                "note" if np.isnan(share) else otherwise,
                 "No controller keeps the signal inside: the actuators are too weak for how fast the funnel narrows.",
                 "Widen the funnel's start, let it narrow more slowly, or add authority.",
                 "least share of actuator bounds over all commands, linearised, best gain on the way",
@@ -155,7 +157,10 @@ def _needed_share(
         b_ub=np.r_[upper - free, free - lower, rest],
         bounds=[(None, None)] * (steps * count) + [(0, None)],
         method="highs",
+        options={"time_limit": programs.PATIENCE},
     )
+    if found.status == 1:
+        return float("nan")  # nothing is known: no reason to fail
     return float(found.x[-1]) if found.status == 0 else float("inf")
 
 
