@@ -13,6 +13,7 @@ from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, c
 from casadi_gnc.allocation.backends import Capability, Found
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 
 Accuracy = Literal["low", "mid", "high"]
 LARGEST = 1e100  # numbers beyond are no commands, and their squares no numbers
@@ -93,7 +94,8 @@ class Allocator:
             status BAD_COMMAND.
         """
         problem = self.problem
-        u, last = np.array(command, dtype=float), self.previous if previous is None else np.array(previous, dtype=float)
+        u = real_array("command", command, AllocationError)
+        last = self.previous if previous is None else real_array("previous", previous, AllocationError)
         rows = len(problem.effectiveness)
         if u.shape != (rows,) or last.shape != (problem.count,):
             raise AllocationError(
@@ -116,7 +118,7 @@ class Allocator:
         return self._answer(u, last, self._solver.find(u, last, lower, upper), None, started, (lower, upper))
 
     def _checked(self, box: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        lower, upper = (np.array(bound, dtype=float) for bound in box)
+        lower, upper = (real_array("box", bound, AllocationError) for bound in box)
         count = self.problem.count
         if lower.shape != (count,) or upper.shape != (count,):
             raise AllocationError(f"box has shapes {lower.shape} and {upper.shape}, expected ({count},) twice")

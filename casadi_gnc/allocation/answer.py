@@ -11,6 +11,9 @@ from casadi_gnc.allocation.problem import AllocationProblem
 
 #: Relative gap and rounding floor (share of h |largest effort|^2) by name of the accuracy wanted.
 ACCURACIES = {"low": (1e-3, 1e-6), "mid": (1e-6, 1e-10), "high": (1e-8, 1e-14)}
+#: Largest gap, of the cost, that counts as certified at the floor, and the share of the floor that always does: costs
+#: so small beside the full effort are those of commands that are nothing but rounding.
+CLOSE, NOTHING = 1e-3, 1e-10
 
 
 class AllocationStatus(Enum):
@@ -18,7 +21,7 @@ class AllocationStatus(Enum):
 
     OPTIMAL = "The forces are optimal to the tolerance, by our certificate."
     AT_ROUNDING = (
-        "The forces are optimal to the floor of the accuracy, a share of the full effort's cost, by our certificate."
+        "The forces are optimal to the floor of the accuracy and within 0.1 % of the least cost, by our certificate."
     )
     NOT_CERTIFIED = "The forces are feasible, but the certificate does not reach the tolerance; see the gap."
     FAILED = "The solver returned nothing usable; the previous forces were kept inside the bounds."
@@ -119,7 +122,7 @@ def certify(
 
 
 def floor_of(problem: AllocationProblem, command: np.ndarray, accuracy: tuple[float, float]) -> float:
-    """Return the gap that is allowed whatever the cost: a share of the cost of missing the full effort."""
+    """Return the gap beyond which nothing counts as rounding: a share of the cost of missing the full effort."""
     effort = np.float64(max(problem.full_effort, float(np.linalg.norm(command))))
     with np.errstate(over="ignore"):
         return float(accuracy[1] * problem.accuracy_weight * effort**2)
@@ -134,7 +137,10 @@ def judge(
         return AllocationStatus.NOT_CERTIFIED
     if gap <= accuracy[0] * cost:
         return AllocationStatus.OPTIMAL
-    return AllocationStatus.AT_ROUNDING if gap <= floor else AllocationStatus.NOT_CERTIFIED
+    if not np.any(command):  # nothing is wanted: the full effort's cost is the only measure there is
+        return AllocationStatus.AT_ROUNDING if gap <= floor else AllocationStatus.NOT_CERTIFIED
+    close = gap <= floor and gap <= max(CLOSE, accuracy[0]) * cost
+    return AllocationStatus.AT_ROUNDING if close or gap <= NOTHING * floor else AllocationStatus.NOT_CERTIFIED
 
 
 def best_weights(
@@ -158,13 +164,13 @@ def best_weights(
     from scipy.optimize import nnls
 
     costs = problem.vertex_costs(forces, command)
-    missing = command - problem.vertices @ forces
+    missing = problem.missing(forces, command)
     gradients = -2 * problem.accuracy_weight * np.einsum("vrn,vr->nv", problem.vertices, missing)
-    effort = 2 * problem.effort_weight * (forces - problem.preferred) + 2 * problem.change_weight * (forces - previous)
+    effort = 2 * problem.effort_weights * (forces - problem.preferred) + 2 * problem.change_weight * (forces - previous)
     moving = upper > lower
     gradients, effort, count = gradients[moving], effort[moving], int(moving.sum())
     up, down = (upper - forces)[moving], (forces - lower)[moving]
-    curvature = 2 * (problem.effort_weight + problem.change_weight)[moving]
+    curvature = 2 * (problem.effort_weights + problem.change_weight)[moving]
     stiffness = 2 * problem.accuracy_weight * np.max(np.sum(problem.vertices**2, axis=1), initial=0.0)
     largest = max(problem.full_effort, float(np.linalg.norm(command)))
     unit = max(problem.objective(forces, command, previous), 1e-18 * problem.accuracy_weight * largest**2)

@@ -51,6 +51,7 @@ from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.allocation.reach import Attainable, Reach
 from casadi_gnc.allocation.zonotope import Zonotope
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 
 #: Most subsets of actuators looked at over all samples; some seconds of work.
 _MOST_WORK = 300_000
@@ -101,7 +102,7 @@ the largest box of its proportions is 50 % of it')
         raise AllocationError(f"units has {len(told)} entries, expected {rows}, one a row")
     box = None if wanted is None else half_widths(wanted, rows)
     shape = np.ones(rows) if box is None else box
-    along = np.eye(rows) if directions is None else np.atleast_2d(np.asarray(directions, dtype=float))
+    along = np.eye(rows) if directions is None else np.atleast_2d(real_array("directions", directions, AllocationError))
     sets = attainable_sets(problem, previous=previous)
     notes: list[str] = []
     nominal, vertices, common = (_reach(one, shape, along, told, notes) for one in sets)

@@ -16,6 +16,7 @@ import numpy as np
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.allocation.zonotope import TOLERANCES, Zonotope
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 
 
 class SetKind(Enum):
@@ -155,7 +156,7 @@ def bounds_of(problem: AllocationProblem, previous: Any) -> tuple[np.ndarray, np
     """Return the bounds of the amplitude, or of one sample after `previous`, checked."""
     if previous is None:
         return problem.lower, problem.upper
-    forces = np.asarray(previous, dtype=float)
+    forces = real_array("previous", previous, AllocationError)
     if forces.shape != (problem.count,) or not np.all(np.isfinite(forces)):
         raise AllocationError(f"previous has shape {forces.shape}, expected {problem.count} finite forces")
     return problem.box(forces)
@@ -163,7 +164,7 @@ def bounds_of(problem: AllocationProblem, previous: Any) -> tuple[np.ndarray, np
 
 def half_widths(value: Any, rows: int) -> np.ndarray:
     """Return the half-widths of a box, (rows,), from numbers or one for all, checked."""
-    array = np.asarray(value, dtype=float)
+    array = real_array("half_widths", value, AllocationError)
     array = np.full(rows, float(array)) if array.ndim == 0 else array
     if array.shape != (rows,) or not np.all(np.isfinite(array)) or np.any(array < 0) or not np.any(array):
         raise AllocationError(f"a box of half-widths {array} is not {rows} non-negative numbers with one above zero")

@@ -24,6 +24,8 @@ import scipy.sparse as sp
 from casadi_gnc.allocation.allocator import LARGEST, Allocator
 from casadi_gnc.allocation.answer import AllocationStatus, Answer
 from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 
 _NOTHING = 1e-7  # shares below are the linear program's tolerance
 _SIZE = 1e-9  # price of 1/size beside the square of tan(angle): of efforts in one direction the largest is taken
@@ -55,8 +57,10 @@ def along_direction(
     the command that the bounds allow; where nothing can be made along the command it is DIRECTION_LOST, the share is
     0 and the forces are those of least error. For a problem of `by_priority` angles are those of its scaled rows.
     """
-    last = allocator.previous if previous is None else np.asarray(previous, dtype=float)
-    problem, command = allocator.problem, np.asarray(command, dtype=float)
+    last = allocator.previous if previous is None else real_array("previous", previous, AllocationError)
+    problem, command = allocator.problem, real_array("command", command, AllocationError)
+    if command.shape != (len(problem.effectiveness),) or last.shape != (problem.count,):
+        return allocator.solve(command, last), 0.0  # which says what is wrong
     if not (np.all(np.abs(command) <= LARGEST) and np.all(np.abs(last) <= LARGEST)):
         return allocator.solve(command, last), 0.0
     share, wanted, status = largest_scale(problem, command, last), command, None

@@ -16,6 +16,7 @@ from casadi_gnc.allocation.allocator import Accuracy, Allocator
 from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, judge, saturation
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 
 #: Cost above the least of all choices, of the cost, that is allowed.
 WITHIN = 0.05
@@ -43,13 +44,15 @@ def with_minimum_impulse(
     """
     if not least >= 0 or np.any(problem.lower < 0):
         raise AllocationError("a minimum impulse needs least >= 0 and actuators that push one way (lower >= 0)")
-    last = np.clip(np.zeros(problem.count), problem.lower, problem.upper) if previous is None else np.asarray(previous)
+    last = np.zeros(problem.count) if previous is None else real_array("previous", previous, AllocationError)
+    last = np.clip(last, problem.lower, problem.upper) if previous is None else last
+    command = real_array("command", command, AllocationError)
     allocator = Allocator(problem, backend, accuracy=accuracy)
     relaxed = allocator.solve(command, last)
     if relaxed.status in (AllocationStatus.BAD_COMMAND, AllocationStatus.FAILED):
         return relaxed
     low, high = problem.box(last)
-    u = np.asarray(command, dtype=float)
+    u = command
     best = _search(problem, allocator, u, last, relaxed, (low, high), least)
     forces = best.forces
     cost = problem.objective(forces, u, last)

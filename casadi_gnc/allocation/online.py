@@ -13,6 +13,7 @@ import numpy as np
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.system import assets, compilers
 
 #: Flags with which gcc vectorises it; the words stay the same.
@@ -173,7 +174,7 @@ class OnlineSolver:
 
 def _shaped(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Return an array that C may read; raise `AllocationError` where it would read past the end."""
-    column = np.ascontiguousarray(array, dtype=float)
+    column = np.ascontiguousarray(real_array("an array", array, AllocationError))
     if column.shape != shape:
         raise AllocationError(f"an array has shape {column.shape}, expected {shape}")
     return column

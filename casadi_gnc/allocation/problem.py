@@ -38,6 +38,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry, corner_errors
 
 
@@ -54,7 +55,8 @@ class AllocationProblem:
         a dead or stuck actuator.
     coupling : E, (P, N); left out for a problem without uncertainty.
     errors : D, (V, R, P), the vertices of the uncertainty.
-    effort_weight, change_weight : diagonals of M1 and M2, (N,) or one number, non-negative.
+    effort_weight, change_weight : diagonals of M1 and M2, (N,) or one number, non-negative. Where both are zero the
+        forces would not be unique, and M1 = 1e-9 h |A|^2 I is minimised and certified; see `effort_weights`.
     accuracy_weight : h > 0.
     max_step : (N,) or one number, largest change of a force in one sample [N]; `inf` for none.
     preferred : Fs, (N,) or one number [N].
@@ -159,14 +161,36 @@ class AllocationProblem:
         """Effectiveness at every vertex, (V, R, N)."""
         return self.effectiveness + np.einsum("vrp,pn->vrn", self.errors, self.coupling)
 
+    @cached_property
+    def effort_weights(self) -> np.ndarray:
+        """M1 as it is minimised and certified, (N,): the one given, or 1e-9 h |A|^2 where M1 = M2 = 0.
+
+        Without any weight the forces are not unique; the on-board solver adds the same.
+        """
+        if np.any(self.effort_weight) or np.any(self.change_weight):
+            return self.effort_weight
+        return np.full(self.count, 1e-9 * self.accuracy_weight * float(np.sum(self.effectiveness**2)))
+
+    @cached_property
+    def _long_vertices(self) -> np.ndarray:
+        long = np.longdouble
+        return self.effectiveness.astype(long) + np.einsum(
+            "vrp,pn->vrn", self.errors.astype(long), self.coupling.astype(long)
+        )
+
+    def missing(self, forces: np.ndarray, command: np.ndarray) -> np.ndarray:
+        """Return u - (A + D_v E) F for every vertex, (V, R): summed in long doubles, because it cancels."""
+        made = np.einsum("vrn,n->vr", self._long_vertices, np.asarray(forces, dtype=np.longdouble))
+        return (command - made).astype(float)
+
     def vertex_costs(self, forces: np.ndarray, command: np.ndarray) -> np.ndarray:
         """Return ``h |u - (A + D_v E) F|^2`` for every vertex, (V,)."""
-        missing = command - self.vertices @ forces
+        missing = self.missing(forces, command)
         return self.accuracy_weight * np.einsum("vr,vr->v", missing, missing)
 
     def objective(self, forces: np.ndarray, command: np.ndarray, previous: np.ndarray) -> float:
         """Return the cost of `forces`."""
-        effort = self.effort_weight @ (forces - self.preferred) ** 2
+        effort = self.effort_weights @ (forces - self.preferred) ** 2
         effort += self.change_weight @ (forces - previous) ** 2
         return float(effort + self.vertex_costs(forces, command).max())
 
@@ -189,11 +213,11 @@ class AllocationProblem:
         lam = np.maximum(weights, 0.0)
         lam = lam / lam.sum() if lam.sum() > 0 else np.full(len(lam), 1 / len(lam))
         costs = self.vertex_costs(forces, command)
-        missing = command - self.vertices @ forces
+        missing = self.missing(forces, command)
         gradient = -2 * self.accuracy_weight * np.einsum("v,vrn,vr->n", lam, self.vertices, missing)
-        gradient += 2 * self.effort_weight * (forces - self.preferred)
+        gradient += 2 * self.effort_weights * (forces - self.preferred)
         gradient += 2 * self.change_weight * (forces - previous)
-        curvature = 2 * (self.effort_weight + self.change_weight)
+        curvature = 2 * (self.effort_weights + self.change_weight)
         down, up = lower - forces, upper - forces
         with np.errstate(divide="ignore", invalid="ignore"):
             free = np.where(curvature > 0, -gradient / curvature, np.where(gradient > 0, -np.inf, np.inf))
@@ -203,14 +227,14 @@ class AllocationProblem:
 
 
 def _finite(name: str, value: Any, dimensions: int) -> np.ndarray:
-    array = np.array(value, dtype=float)
+    array = real_array(name, value, AllocationError)
     if array.ndim != dimensions or not np.all(np.isfinite(array)):
         raise AllocationError(f"{name} has shape {array.shape}, expected {dimensions} dimensions of finite numbers")
     return array
 
 
 def _each(name: str, value: Any, count: int, *, finite: bool = True) -> np.ndarray:
-    array = np.array(value, dtype=float)
+    array = real_array(name, value, AllocationError)
     if array.ndim == 0:
         array = np.full(count, float(array))
     good = np.isfinite(array) if finite else ~np.isnan(array)

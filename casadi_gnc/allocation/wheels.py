@@ -20,6 +20,7 @@ from scipy.linalg import null_space
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.mechanics.reaction_wheels import WheelArray, acceleration_bounds
 
 
@@ -59,7 +60,7 @@ def at_speed(
     desaturation : rate [1/s] at which speeds are brought to zero through the null space of the
         axes, where they make no torque; 0 leaves them.
     """
-    speed = np.asarray(speed, dtype=float)
+    speed = real_array("speed", speed, AllocationError)
     if speed.shape != (problem.count,) or not period > 0:
         raise AllocationError(f"speed has shape {speed.shape}, expected ({problem.count},); period {period} > 0")
     box = (ca.DM(problem.lower), ca.DM(problem.upper))

@@ -29,6 +29,7 @@ import numpy as np
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.errors import AllocationError, BenchmarkError, ProblemError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.system import csv_file
 
 _NAMES = ("B", "v", "plim", "rlim", "T", "u", "wu", "gamma")
@@ -193,11 +194,7 @@ def _mat(path: Path) -> dict[str, np.ndarray]:
         raise BenchmarkError(f"{path} cannot be read as a .mat file of version 7 or older") from error
     found = {}
     for name in (name for name in _NAMES if name in content):
-        value = content[name].toarray() if hasattr(content[name], "toarray") else content[name]
-        try:
-            found[name] = np.asarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise BenchmarkError(f"{path}: {name} is no matrix of real numbers; save it as one") from None
+        found[name] = real_array(f"{path}: {name}", content[name], BenchmarkError)
     return found
 
 

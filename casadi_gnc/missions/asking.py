@@ -14,6 +14,7 @@ import numpy as np
 
 from casadi_gnc import guests
 from casadi_gnc.errors import GncError, LawError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.signals import Layout
 
 #: What Python decides at once is not known of a symbol.
@@ -62,7 +63,11 @@ def column(owner: Any, method: str, value: Any, expected: Layout | int, what: st
         raise LawError(f"{name} returned an MX expression, {wanted} of SX; functions of MX have to be expanded")
     if not isinstance(value, (ca.SX, ca.DM, np.ndarray, int, float, np.number)):
         raise LawError(f"{name} returned {_kind(value)}, {wanted}")
-    found = ca.SX(value) if isinstance(value, (ca.SX, ca.DM)) else ca.SX(ca.DM(np.asarray(value, dtype=float)))
+    found = (
+        ca.SX(value)
+        if isinstance(value, (ca.SX, ca.DM))
+        else ca.SX(ca.DM(real_array(f"{name} returned an array that", value, LawError)))
+    )
     shape = found.shape
     if size and (found.numel() != size or (shape[1] != 1 and size > 1)):
         raise LawError(f"{name} returned {shape[0]} x {shape[1]} numbers, {wanted}")

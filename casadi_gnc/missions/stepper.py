@@ -15,6 +15,7 @@ from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.machine import Machine
 from casadi_gnc.errors import FlightError, NoCompilerError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.missions.onboard import describe
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system.folders import workshop
@@ -76,7 +77,7 @@ class Stepper:
             raise FlightError(f"step was given {given}; expected each of {', '.join(layout.names)}")
         row = [float(t)]
         for signal in layout.signals:
-            numbers = np.asarray(measurements[signal.name], dtype=float).ravel()
+            numbers = real_array(signal.name, measurements[signal.name], FlightError).ravel()
             if numbers.size != signal.size:
                 raise FlightError(f"{signal.name} has {numbers.size} numbers, expected {signal.size}")
             row.extend(numbers)

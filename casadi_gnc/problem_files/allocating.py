@@ -18,6 +18,7 @@ from casadi_gnc.allocation.allocator import Accuracy
 from casadi_gnc.allocation.direction import along_direction
 from casadi_gnc.allocation.impulse import with_minimum_impulse
 from casadi_gnc.errors import ProblemError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.problem_files.allocation_file import AllocationCase
 from casadi_gnc.system import csv_file
 
@@ -40,7 +41,7 @@ class CaseAllocator:
 
     def solve(self, command: np.ndarray) -> Answer:
         """Return the answer to a command (R,) in its own unit; unallocated effort is in that unit too."""
-        case, scaled = self.case, np.asarray(command, dtype=float) * self.case.row_scale
+        case, scaled = self.case, real_array("command", command, ProblemError) * self.case.row_scale
         started = time.perf_counter()
         if case.least_force is not None:
             answer = with_minimum_impulse(

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import SynthesisError
+from casadi_gnc.mathematics.arrays import real_array
 
 
 @dataclass(frozen=True)
@@ -39,10 +40,7 @@ def matrices(**given: Any) -> list[np.ndarray]:
     """Return matrices as finite two-dimensional arrays; raise `SynthesisError` with the name of one that is none."""
     found = []
     for name, value in given.items():
-        try:
-            matrix = np.array(value, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise SynthesisError(f"{name} is no matrix of numbers: {error}") from error
+        matrix = real_array(name, value, SynthesisError)
         if matrix.ndim != 2 or not np.all(np.isfinite(matrix)):
             raise SynthesisError(f"{name} has shape {matrix.shape}, expected a matrix of finite numbers")
         found.append(matrix)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import SynthesisError
+from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.synthesis.analysis import fits, matrices, poles
 
 _SAMPLES = 4000  # along the horizon
@@ -38,7 +39,7 @@ class Peak:
 
 def box_vertices(lower: Any, upper: Any) -> np.ndarray:
     """Return the vertices, (V, n), of a box; sides of length zero are not doubled."""
-    low, high = np.array(lower, dtype=float), np.array(upper, dtype=float)
+    low, high = real_array("lower", lower, SynthesisError), real_array("upper", upper, SynthesisError)
     if low.shape != high.shape or low.ndim != 1 or not np.all(low <= high):
         raise SynthesisError(f"a box has bounds of one length, lower below upper; got {low} and {high}")
     if np.sum(low < high) > _MOST:

@@ -35,6 +35,8 @@ static int read_command(command_t *command, const data_t *data, const real *torq
         command->dead[i] = high - low <= 8 * EPS * larger(size_of(low), size_of(high)) + TINY ? 1 : 0;
         command->c[i] = -(data->m1[i] * data->preferred[i] + data->m2[i] * previous[i]);
     }
+    command->floor = 0;
+    command->careful = 0;
     sound &= GNC_ASSERT(data->ready == READY);
     return sound & GNC_ASSERT(is_finite(sum));
 }
@@ -138,6 +140,33 @@ static int finish(workspace_t *work, const data_t *data, command_t *command, poi
     return certified;
 }
 
+/* Rounding of the residuals ended the search above what is called close: what has been found is evaluated with twice
+ * the digits, and if it is not good then, the interior point begins anew with them. */
+static int refine(workspace_t *work, const data_t *data, command_t *command, point_t *point, int32_t *iterations)
+{
+    int32_t more = 0;
+    real gap;
+    command->careful = 1;
+    command->floor = 0;
+    NAME(evaluate)(data, command, work->force, work->lambda, point);
+    gap = point->gap;
+    if (!is_optimal(data, point) && GNC_ASSERT(is_finite(gap))) {
+        real force[N], lambda[V];
+        (void)memcpy(force, work->force, sizeof force);
+        (void)memcpy(lambda, work->lambda, sizeof lambda);
+        (void)NAME(interior_point)(work, data, command, point, &more);
+        *iterations += more;
+        if (!(point->gap <= gap)) {
+            (void)memcpy(work->force, force, sizeof force);
+            (void)memcpy(work->lambda, lambda, sizeof lambda);
+            work->warm = 0;
+            NAME(evaluate)(data, command, work->force, work->lambda, point);
+        }
+    }
+    return point->gap <= (real)CLOSE * point->phi ||
+           (data->regularised != 0 && point->gap <= (real)1e-5 * point->phi);
+}
+
 static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const real *torque,
                         const real *previous, const real *lower, const real *upper,
                         const real *max_step, result_t *result)
@@ -175,6 +204,10 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
         if (!certified && follow != 0) {
             certified = finish(work, data, &command, &point, &result->active_set_iterations);
         }
+    }
+    if (!(point.gap <= (real)CLOSE * point.phi) && point.gap > 0) {
+        certified = refine(work, data, &command, &point, &result->interior_point_iterations);
+        result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
     }
     if (!report(data, &command, lower, upper, work, &point, result)) { /* overflow: numbers too large */
         forget(work);

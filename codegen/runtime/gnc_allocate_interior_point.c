@@ -13,7 +13,7 @@
  */
 #include "gnc_allocate_internal.h"
 
-enum { MAX_STEPS = 30 };
+enum { MAX_STEPS = 30, MAX_CAREFUL_STEPS = 60 };
 #define SHORT_STEP (real)0.1 /* a step this short did not pay: centre instead */
 #define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
                               * easy problems and loses the way in degenerate ones */
@@ -170,16 +170,23 @@ static real mean_now(const iterate_t *it, int products)
     return sum / (real)products;
 }
 
-/* Take a step. Each force is measured from its nearer bound, so that none is lost in rounding. */
+/* Take a step. Each force is measured from its nearer bound, so that none is lost in rounding; with care for digits
+ * from zero where that is nearer still. */
 static void advance(iterate_t *it, real *force, const direction_t *dir, const command_t *command, real step)
 {
     int i, v;
     for (i = 0; i < N; ++i) {
+        const real moved = force[i] + step * dir->F[i];
         it->down[i] += step * dir->F[i];
         it->up[i] -= step * dir->F[i];
         it->zl[i] += step * dir->zl[i];
         it->zu[i] += step * dir->zu[i];
         force[i] = it->down[i] < it->up[i] ? command->lower[i] + it->down[i] : command->upper[i] - it->up[i];
+        if (command->careful != 0 && size_of(moved) < smaller(it->down[i], it->up[i])) {
+            force[i] = moved;
+            it->down[i] = moved - command->lower[i];
+            it->up[i] = command->upper[i] - moved;
+        }
         if (command->dead[i] != 0) {
             force[i] = command->lower[i];
         }
@@ -235,12 +242,13 @@ int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t 
     iterate_t it;
     real force[N], best, last = -1;
     int k, going;
+    const int most = command->careful != 0 ? MAX_CAREFUL_STEPS : MAX_STEPS;
     const int products = start(&it, force, data, command, point);
     rest(work, data, command, it.lambda, point);
     best = point->gap;
     going = !is_optimal(data, point);
     *iterations = 0;
-    for (k = 0; k <= MAX_STEPS && going; ++k) {
+    for (k = 0; k <= MAX_CAREFUL_STEPS && going; ++k) {
         *iterations = k;
         NAME(evaluate)(data, command, force, it.lambda, point);
         if (point->gap < best) {
@@ -253,8 +261,10 @@ int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t 
             going = 0; /* below the rounding floor go on only while the gap still falls */
         }
         last = point->gap;
-        if (going && k < MAX_STEPS) {
+        if (going && k < most) {
             going = iterate(&it, force, data, command, point, products);
+        } else {
+            going = 0;
         }
     }
     if (point->gap != best) { /* an earlier iterate was better */

@@ -72,13 +72,19 @@ typedef NAME(result) result_t;
 #define DEFAULT_TOLERANCE 1e-3F
 #define ROUNDING_FLOOR 2e-6F
 #define CURVATURE_FLOOR 1e-6F
+#define NO_CURVATURE_FLOOR 1e-4F
+#define CLOSE 1e-2F
+#define SPLITTER 4097.0F
 #else
 #define ARITHMETIC_FAULTS() gnc_arithmetic_faults()
 #define EPS 2.220446049250313e-16
 #define TINY 1e-200
 #define DEFAULT_TOLERANCE 1e-8
 #define ROUNDING_FLOOR 5e-15  /* gap, of the size of phi over the box, that rounding explains */
-#define CURVATURE_FLOOR 1e-10 /* least curvature of a Newton step, of that of the torque error */
+#define CLOSE 1e-6            /* gap, of phi, up to which an answer at the rounding floor is left at that */
+#define SPLITTER 134217729.0  /* 2^27 + 1: cuts a number into two halves */
+#define CURVATURE_FLOOR 1e-12 /* least curvature of a Newton step, of that of the torque error in one force */
+#define NO_CURVATURE_FLOOR 1e-8 /* the same where there are no weights */
 #endif
 #define OFF_SIMPLEX (64 * (real)(int)V * EPS) /* of the sum of the vertex weights: more is no rounding */
 
@@ -97,6 +103,7 @@ typedef struct {
     real lower[N], upper[N];
     int8_t dead[N]; /* 1: no room to move */
     real floor;     /* gap that counts as zero, once somebody asked */
+    int careful;    /* 1: residuals with twice the digits */
 } command_t;
 
 /* Everything about one point F with vertex weights lambda. */

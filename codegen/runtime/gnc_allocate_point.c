@@ -7,7 +7,51 @@
  */
 #include "gnc_allocate_internal.h"
 
-void NAME(residuals)(const data_t *data, const command_t *command, const real *force, point_t *point)
+/* A number as the sum of two, the second what the first lost in rounding. */
+typedef struct {
+    real high, low;
+} pair_t;
+
+/* sum + a * b with about twice the digits (T. J. Dekker, 1971, doi:10.1007/BF01397083). */
+static pair_t plus_product(pair_t sum, real a, real b)
+{
+    const real product = a * b, ca = (real)SPLITTER * a, cb = (real)SPLITTER * b;
+    const real a1 = ca - (ca - a), b1 = cb - (cb - b), a2 = a - a1, b2 = b - b1;
+    const real lost = a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2);
+    pair_t total;
+    real part;
+    total.high = sum.high + product;
+    part = total.high - sum.high;
+    total.low = sum.low + lost + ((sum.high - (total.high - part)) + (product - part));
+    return total;
+}
+
+/* r, and y, where torque and forces cancel in all digits that one number has. */
+static void careful_residuals(const data_t *data, const command_t *command, const real *force, point_t *point)
+{
+    int i, k, a, j, v;
+    pair_t y[K];
+    for (k = 0; k < K; ++k) {
+        y[k].high = 0;
+        y[k].low = 0;
+        for (i = 0; i < N; ++i) {
+            y[k] = plus_product(y[k], data->S[k][i], force[i]);
+        }
+        point->y[k] = y[k].high + y[k].low;
+    }
+    for (a = 0; a < R; ++a) {
+        for (v = 0; v < V; ++v) {
+            pair_t r = plus_product(y[a], -1, command->b[a]);
+            for (j = 0; j < P; ++j) {
+                r = plus_product(r, data->D[a][j][v], y[R + j].high);
+                r.low += data->D[a][j][v] * y[R + j].low;
+            }
+            point->r[a][v] = r.high + r.low;
+        }
+    }
+}
+
+static void plain_residuals(const data_t *data, const command_t *command, const real *force, point_t *point)
 {
     int i, k, a, j, v;
     real y[K] = {0};
@@ -17,9 +61,6 @@ void NAME(residuals)(const data_t *data, const command_t *command, const real *f
         }
     }
     (void)memcpy(point->y, y, sizeof y);
-    for (v = 0; v < V; ++v) {
-        point->q[v] = 0;
-    }
     for (a = 0; a < R; ++a) {
         for (v = 0; v < V; ++v) {
             real r = y[a] - command->b[a];
@@ -27,7 +68,24 @@ void NAME(residuals)(const data_t *data, const command_t *command, const real *f
                 r += data->D[a][j][v] * y[R + j];
             }
             point->r[a][v] = r;
-            point->q[v] += (real)0.5 * r * r;
+        }
+    }
+}
+
+void NAME(residuals)(const data_t *data, const command_t *command, const real *force, point_t *point)
+{
+    int a, v;
+    if (command->careful != 0) {
+        careful_residuals(data, command, force, point);
+    } else {
+        plain_residuals(data, command, force, point);
+    }
+    for (v = 0; v < V; ++v) {
+        point->q[v] = 0;
+    }
+    for (a = 0; a < R; ++a) {
+        for (v = 0; v < V; ++v) {
+            point->q[v] += (real)0.5 * point->r[a][v] * point->r[a][v];
         }
     }
     point->worst = point->q[0];

@@ -61,6 +61,17 @@ static real set_matrices(data_t *data, const problem_t *problem)
     return size_A0;
 }
 
+/* N times the torque term's curvature in one actuator's force: for columns alike that of all together. */
+static real size_of_column(const data_t *data, int i)
+{
+    int a;
+    real sum = 0;
+    for (a = 0; a < R; ++a) {
+        sum += data->S[a][i] * data->S[a][i];
+    }
+    return (real)(int)N * sum;
+}
+
 /* Weights and the curvature of Newton steps; return 0 where the numbers are too large for it. */
 static int set_weights(data_t *data, const problem_t *problem, real size_A0)
 {
@@ -80,8 +91,9 @@ static int set_weights(data_t *data, const problem_t *problem, real size_A0)
         data->q[i] = is_finite(1 / sum) ? sum : 0; /* subnormal weights bend nothing: no curvature */
         data->inv_q[i] = data->q[i] > 0 ? 1 / data->q[i] : 0;
         /* Zero or vanishing weights: a Newton step needs some curvature to be well defined. Adding it
-         * to the step, not to the problem, makes the iteration a proximal-point method. */
-        least = (data->q[i] > 0 ? (real)CURVATURE_FLOOR : 100 * (real)CURVATURE_FLOOR) * size_A0;
+         * to the step, not to the problem, makes the iteration a proximal-point method. Each actuator has
+         * its own: of that of the strongest one a weak one would hardly move. */
+        least = (data->q[i] > 0 ? (real)CURVATURE_FLOOR : (real)NO_CURVATURE_FLOOR) * size_of_column(data, i);
         data->curvature[i] = larger(data->q[i], larger(least, TINY));
         data->inv_curvature[i] = 1 / data->curvature[i];
         sound &= GNC_ASSERT(is_finite(data->curvature[i]));

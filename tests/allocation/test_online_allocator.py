@@ -89,7 +89,7 @@ def small_build(tmp_path, *flags):
 def test_code_is_small_and_has_no_state(tmp_path):
     lines = subprocess.run(["size", *small_build(tmp_path)], check=True, capture_output=True, text=True).stdout
     text, data, bss = np.array([[int(x) for x in line.split()[:3]] for line in lines.splitlines()[1:]]).sum(axis=0)
-    assert text < 20_000
+    assert text < 21_000  # the residuals with twice the digits are 450 bytes of it
     assert data == bss == 0
 
 
@@ -261,7 +261,7 @@ def check(problem, u, previous, lower, upper, step, results, limit=1e-8):
         assert abs(r["gap"] - gap) <= 1e-9 * f + 1e-15 * scale
         assert abs(r["objective"] - f) <= 1e-11 * f + 1e-15 * scale
         assert abs(np.sum(r["lam"]) - 1) < 1e-12
-        assert r["interior_point_iterations"] <= 30
+        assert r["interior_point_iterations"] <= 30 + 60  # plain, and with twice the digits
 
 
 @pytest.mark.parametrize("family", oa.FAMILIES)

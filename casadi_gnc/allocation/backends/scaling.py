@@ -72,7 +72,7 @@ class ScaledSolver(ABC):
         # hundredth of the effort puts it near 1, where the solvers' tolerances bite.
         self._effort = 1e-2 * self._full
         self._cost = 2 * problem.accuracy_weight * self._effort**2
-        self.effort_quadratic = 2 * problem.effort_weight * self._reach**2 / self._cost
+        self.effort_quadratic = 2 * problem.effort_weights * self._reach**2 / self._cost
         self.change_quadratic = 2 * problem.change_weight * self._reach**2 / self._cost
         self.quadratic = self.effort_quadratic + self.change_quadratic
         self.matrices = problem.vertices * self._reach / self._effort
