@@ -37,6 +37,7 @@ def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
         "why": _reasons(campaign),
         "confidence": confidence,
         "weighted": weighted,
+        "representative": campaign.cases.plan.representative,
         "effective_flights": statistics.effective_flights(weights) if weighted else int(flew.sum()),
         "metrics": {},
         "requirements": {},
@@ -44,6 +45,8 @@ def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
     }
     if not flew.any():
         return told
+    if not campaign.cases.plan.representative:  # chosen cases say what is possible, not how often
+        return told | {"metrics": {one.name: _extremes(campaign, one, flew) for one in campaign.metrics}}
     inputs = campaign.columns(campaign.identity["parameters"])[flew]
     for metric in campaign.metrics:
         told["metrics"][metric.name] = _metric(campaign, metric, flew, inputs, counted, confidence)
@@ -81,9 +84,22 @@ def _metric(
         low, high = statistics.limits(known, 0.9973, confidence, "lower" if lowest else "upper")
         told["tolerance_limit"] = _number(low if lowest else high)
         told["drivers"] = _drivers(campaign, inputs, badness(metric, values), confidence)
+    return told | {"worst": _worst(campaign, metric, flew)}
+
+
+def _extremes(campaign: Campaign, metric: Metric, flew: np.ndarray) -> dict[str, Any]:
+    """Return the range of a metric over cases that are no sample of anything."""
+    values = campaign.column(f"metric.{metric.name}")[flew]
+    known = values[~np.isnan(values)]
+    told: dict[str, Any] = {"unit": metric.unit, "kind": metric.kind, "without": int(np.isnan(values).sum())}
+    told["range"] = [float(known.min()), float(known.max())] if len(known) else None
+    return told | {"percentiles": {}, "worst": _worst(campaign, metric, flew)}
+
+
+def _worst(campaign: Campaign, metric: Metric, flew: np.ndarray) -> list[dict[str, Any]]:
+    values = campaign.column(f"metric.{metric.name}")[flew]
     order = np.argsort(-badness(metric, values), kind="stable")[:_WORST]
-    told["worst"] = [{"case": int(campaign.column("case")[flew][i]), "value": _number(float(values[i]))} for i in order]
-    return told
+    return [{"case": int(campaign.column("case")[flew][i]), "value": _number(float(values[i]))} for i in order]
 
 
 def _requirement(campaign: Campaign, one: Requirement, flew: np.ndarray, weights: np.ndarray | None) -> dict[str, Any]:

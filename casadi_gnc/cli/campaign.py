@@ -122,6 +122,8 @@ def _print(found: Campaign, confidence: float, json: bool) -> None:
         table.add_column(name, justify="left" if name in ("", "bounds") else "right")
     for name, one in summary["metrics"].items():
         unit = f" [{one['unit']}]" if one["unit"] not in ("", "-") else ""
+        if one.get("range"):
+            table.add_row(escape(name.replace("_", " ") + unit), "all", "", "{:.4g} to {:.4g}".format(*one["range"]))
         for number, (share, found_one) in enumerate(one["percentiles"].items()):
             value, low, high = (_shown(found_one[part]) for part in ("value", "low", "high"))
             first = escape(name.replace("_", " ") + unit) if number == 0 else ""

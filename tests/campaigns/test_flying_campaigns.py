@@ -352,3 +352,13 @@ def test_the_summary_has_bounds_that_enclose_what_it_tells(tmp_path):
     assert final["drivers"][0]["key"].startswith("initial.rate_rad_per_s")
     assert math.isfinite(final["worst"][0]["value"])
     json.dumps(summary, allow_nan=False)
+
+
+def test_chosen_cases_are_told_by_their_range_and_not_by_shares():
+    found = flown(plan="one_at_a_time", flights=9)
+    told = found.summary()
+    assert not told["representative"]
+    values = found.column("metric.final_rate")
+    assert told["metrics"]["final_rate"]["range"] == [values.min(), values.max()]
+    assert told["metrics"]["final_rate"]["percentiles"] == {}
+    assert (told["requirements"], told["statuses"]) == ({}, {})
