@@ -63,7 +63,8 @@ def generate(
     typer.echo(terminal(f"{about['title']}, scheme {about['scheme']}, {about['real']}: wrote {folder}"))
     for warning in about["warnings"]:
         typer.echo(terminal(f"warning: {warning}"))
-    typer.echo(f"next: make -C {shell(folder)} test; casadi-gnc verify {shell(folder)} --target host,cortex-m7")
+    place = shell(f"./{folder}" if str(folder).startswith("-") else folder)  # else it would be taken for an option
+    typer.echo(f"next: make -C {place} test; casadi-gnc verify {place} --target host,cortex-m7")
 
 
 def _words(text: str) -> list[str]:

@@ -158,3 +158,11 @@ def test_a_terminal_of_few_letters(tmp_path):
     assert done.stdout.startswith("\\u59ff\\u52e2, scheme pd_pinv")
     line = done.stdout.splitlines()[-1].removeprefix("next: ").split("; ")[0]
     assert run("sh", "-c", line).returncode == 0  # a folder with a space in its name, as printed
+
+
+def test_a_folder_that_looks_like_an_option_is_printed_as_a_folder(tmp_path):
+    command = [sys.executable, "-m", "casadi_gnc.cli.main", "generate", "huang2020/detumble", "--out", "./-dash"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "next: make -C ./-dash test; casadi-gnc verify ./-dash" in done.stdout
+    assert (tmp_path / "-dash" / "Makefile").is_file()
