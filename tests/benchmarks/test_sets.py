@@ -102,7 +102,7 @@ def test_data_from_outside_is_read_from_mat_and_csv_alike(tmp_path):
         # as QCAT's f18data.mat has it
         ({"rlim": LIMITS, "T1": 0.02, "T2": 0.04}, "there is T1, T2: save one of them as T"),
         ({"T": 0.02}, "rlim is missing"),
-        ({"B": np.array([["a"]], dtype=object)}, "B is no matrix of real numbers"),
+        ({"B": np.array([["a"]], dtype=object)}, "B is no array of numbers"),
         ({"u": np.ones((3, 2))}, "u has 2 samples, v 4"),
         ({"wu": np.ones(2)}, "wu has 2 entries, expected 1 or 3"),
     ],
