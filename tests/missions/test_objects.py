@@ -64,7 +64,7 @@ def test_the_same_by_a_file_and_by_objects_flies_the_same_words(tmp_path):
 def test_arrays_and_tuples_are_lists_to_a_craft():
     assert craft(inertia_kg_m2=np.array(INERTIA)).inertia_kg_m2 == INERTIA
     assert craft(inertia_kg_m2=ca.DM(INERTIA)).inertia_kg_m2 == INERTIA
-    with pytest.raises(gnc.GncError, match=r"StarterCraft: max_torque_N_m: is -1, expected a number > 0; mass: unknown key"):
+    with pytest.raises(gnc.GncError, match="max_torque_N_m: is -1, expected a number > 0; mass: unknown key"):
         craft(max_torque_N_m=-1, mass=3.0)
 
 
