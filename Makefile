@@ -3,6 +3,7 @@
 # make test     style, types and the fast tests: about ten minutes on two cores
 # make test-all style, types and every test; needs clang, clang-tidy, cppcheck, g++ and `make targets`, and skips by
 #               name what a missing one prevents (with CI=true: fails)
+# make test-long  hundreds of kills and thousands of mutated files, of which test-all takes some: some hours
 # make gates    the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers; needs
 #               clang, clang-tidy, cppcheck and g++
 # make targets  compilers and emulators of the flight targets (Debian packages; needs root)
@@ -19,13 +20,13 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test test-all test-oldest lock bench ratios gates targets pictures lint docs clean
+.PHONY: demo test test-all test-long test-oldest lock bench ratios gates targets pictures lint docs clean
 
 # One BLAS thread a process: two processes share the cores.
 PYTEST := -m pytest -q -n 2
-test test-all test-oldest: export OPENBLAS_NUM_THREADS = 1
+test test-all test-long test-oldest: export OPENBLAS_NUM_THREADS = 1
 # Tests that need more than the README asks for, and tests that take long, are in `make test-all` alone.
-FAST := -m 'not tools and not slow'
+FAST := -m 'not tools and not slow and not long'
 
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
@@ -34,7 +35,10 @@ test: .venv/installed-dev lint
 	$(BIN)/python $(PYTEST) $(FAST)
 
 test-all: .venv/installed-dev lint
-	$(BIN)/python $(PYTEST)
+	$(BIN)/python $(PYTEST) -m 'not long'
+
+test-long: .venv/installed-dev
+	$(BIN)/python $(PYTEST) -m long
 
 # Old packages on new ones beneath them are told that they are old; that is no failure.
 test-oldest: .venv-oldest/installed

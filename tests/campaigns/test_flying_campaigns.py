@@ -334,7 +334,7 @@ def tables(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("kills", [4, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kills", [4, pytest.param(100, marks=pytest.mark.long)])
 def test_killed_at_any_moment_and_run_again_the_tables_are_those_of_an_undisturbed_run(problem, tmp_path, kills):
     assert run(
         "campaign", problem, "--flights", 400, "--scheme", "observer_pinv", "--out", tmp_path / "calm"

@@ -4,8 +4,8 @@ import pytest
 from judging import WORDS, judge, wrong
 from mutating import CHANGES, mutant, sources
 
-#: What the quick tests run; the slow one goes on from there.
-QUICK, ALL = 40, 5000
+#: What the quick tests run; the slow one goes on from there, the long one from that.
+QUICK, MORE, ALL = 40, 200, 5000
 
 
 @pytest.fixture
@@ -30,8 +30,13 @@ def test_mutants(tmp_path):
 
 
 @pytest.mark.slow
+def test_more_mutants(tmp_path):
+    _no_faults(range(QUICK, MORE), tmp_path)
+
+
+@pytest.mark.long
 def test_five_thousand_mutants(tmp_path):
-    _no_faults(range(QUICK, ALL), tmp_path)
+    _no_faults(range(MORE, ALL), tmp_path)
 
 
 def test_the_same_seed_is_the_same_mutant():

@@ -156,11 +156,14 @@ def left_over(place: Path) -> list[str]:
     return [str(path) for path in [*found, *(place / "temporary").iterdir()]]
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+@pytest.mark.parametrize(
+    "share", [pytest.param(0.08, marks=pytest.mark.slow), pytest.param(1.0, marks=pytest.mark.long)]
+)
 @pytest.mark.parametrize("name", CASES)
-def test_killed_at_any_moment(name, tmp_path):
+def test_killed_at_any_moment(name, share, tmp_path):
     case, rng = CASES[name], np.random.default_rng(2020)
+    kills = round(share * case.kills)
     (tmp_path / "temporary").mkdir()
     case.begin(tmp_path)
     for _ in range(2):  # the first compiles what the cache keeps then
@@ -170,7 +173,7 @@ def test_killed_at_any_moment(name, tmp_path):
             assert run.wait() == 0, run.stderr.read()
     length, killed = time.monotonic() - since, 0
     case.holds(tmp_path)
-    for k in range(case.kills):
+    for k in range(kills):
         if k % 2:
             case.renew(tmp_path)
         with start(tmp_path, (*case.words, *case.turns[k % len(case.turns)])) as run:
@@ -186,7 +189,7 @@ def test_killed_at_any_moment(name, tmp_path):
                 os.kill(process, signal.SIGKILL)
             assert left == [], f"kill {k} left processes"
         case.holds(tmp_path)
-    assert killed > case.kills / 4  # the others had ended before
+    assert killed >= kills / 4  # the others had ended before
     with start(tmp_path, (*case.words, *case.turns[0])) as run:
         assert run.wait() == 0, run.stderr.read()
     case.holds(tmp_path)
