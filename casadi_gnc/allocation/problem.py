@@ -56,7 +56,7 @@ class AllocationProblem:
     coupling : E, (P, N); left out for a problem without uncertainty.
     errors : D, (V, R, P), the vertices of the uncertainty.
     effort_weight, change_weight : diagonals of M1 and M2, (N,) or one number, non-negative. Where both are zero the
-        forces would not be unique, and M1 = 1e-9 h |A|^2 I is minimised and certified; see `effort_weights`.
+        forces would not be unique, and ``M1 = 1e-9 h |A|^2 I`` is minimised and certified; see `effort_weights`.
     accuracy_weight : h > 0.
     max_step : (N,) or one number, largest change of a force in one sample [N]; `inf` for none.
     preferred : Fs, (N,) or one number [N].
@@ -163,7 +163,7 @@ class AllocationProblem:
 
     @cached_property
     def effort_weights(self) -> np.ndarray:
-        """M1 as it is minimised and certified, (N,): the one given, or 1e-9 h |A|^2 where M1 = M2 = 0.
+        """M1 as it is minimised and certified, (N,): the one given, or ``1e-9 h |A|^2`` where M1 = M2 = 0.
 
         Without any weight the forces are not unique; the on-board solver adds the same.
         """
