@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.result import Campaign
@@ -49,7 +51,7 @@ def campaign(
         raise CampaignError(f"what is {str(folder)!r}? the folder of a campaign is given as --out {folder}")
     if engine not in ("auto", "c"):
         raise CampaignError(f"no engine {engine!r}; there is auto and c")
-    with _Progress(quiet=json) as told:
+    with Progress("cases", quiet=json) as told:
         made = by_name.campaign(
             problem,
             1000 if flights is None else flights,
@@ -63,37 +65,6 @@ def campaign(
             told=told,
         )
     _print(made, confidence, json)
-
-
-class _Progress:
-    """Show a bar with the time that is left, once a second has passed; on a terminal only."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        import time
-
-        self._quiet, self._since, self._bar, self._task = quiet, time.monotonic(), None, None
-
-    def __enter__(self) -> Any:
-        return self._update
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def _update(self, done: int, total: int) -> None:
-        import time
-
-        if self._quiet or (self._bar is None and time.monotonic() - self._since < 1.0):
-            return
-        if self._bar is None:
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeRemainingColumn
-
-            columns = ("cases", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task("", total=total, completed=done)
-        self._bar.update(self._task, completed=done)  # type: ignore[arg-type]
 
 
 def _print(found: Campaign, confidence: float, json: bool) -> None:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli.progress import Progress
+
 if TYPE_CHECKING:
     from casadi_gnc.missions.flight import Flight
     from casadi_gnc.missions.mission import Mission
@@ -67,7 +69,7 @@ def fly(
     flights, written = [], []
     _warn(mission, chosen, mode)
     for name in dict.fromkeys(chosen):
-        with _Progress(name, quiet=json) as progress:
+        with Progress(name, quiet=json) as progress:
             flights.append(
                 fly_one(
                     mission, name, engine=engine, maths=math.value, mode=mode.value if mode else None,
@@ -95,7 +97,7 @@ def _fly_case(campaign: Path, case: str, out: Path | None, decimation: int | Non
     found = open_campaign(campaign).case(case)
     mission = found.cases.varied.nominal
     folder = prepare_folder(Path("out") / f"{mission.name}-case-{found.number}" if out is None else out)
-    with _Progress(f"case {found.number}", quiet=json) as progress:
+    with Progress(f"case {found.number}", quiet=json) as progress:
         flight = found.fly(decimation=decimation, progress=progress)
     written = [flight.save(folder), results.save_summary(folder, [flight])]
     if plots:
@@ -130,7 +132,7 @@ def _fly_sweeps(
 
     flown = []
     for sweep in sweeps:
-        with _Progress(sweep.name, quiet=quiet) as progress:
+        with Progress(sweep.name, quiet=quiet) as progress:
             flown.append((sweep, fly_sweep(sweep, chosen, told=progress, **options)))
     written = save_sweeps(folder, flown)
     if quiet:
@@ -161,36 +163,6 @@ def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
     if len(flights) > 1:
         pictures.append(plots.plot_comparison(mission, flights, folder))
     return pictures
-
-
-class _Progress:
-    """Show a bar once a flight has taken a second; on a terminal only."""
-
-    def __init__(self, name: str, *, quiet: bool) -> None:
-        import time
-
-        self._name, self._quiet, self._since, self._bar, self._task = name, quiet, time.monotonic(), None, None
-
-    def __enter__(self) -> Any:
-        return self._update
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def _update(self, done: int, total: int) -> None:
-        import time
-
-        if self._quiet or (self._bar is None and time.monotonic() - self._since < 1.0):
-            return
-        if self._bar is None:
-            from rich.console import Console
-            from rich.progress import Progress
-
-            self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task(self._name, total=total)
-        self._bar.update(self._task, completed=done)  # type: ignore[arg-type]
 
 
 def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None:
