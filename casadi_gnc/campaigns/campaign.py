@@ -30,6 +30,8 @@ from casadi_gnc.status import StepStatus
 
 #: Samples of a shard, about: seconds of one core.
 _SHARD_SAMPLES = 3e7
+#: Cases of which one must be able to fly before anything is written.
+_LOOKED_AT = 64
 #: Called as told(cases done, cases in all).
 Told = Callable[[int, int], None]
 
@@ -86,6 +88,9 @@ def campaign(
             f"nothing differs from case to case: {mission.name} has neither a [[dispersion]] nor noise; add one"
         )
     _refuse_unwatched(cases)
+    first = cases.draw(0, min(flights, _LOOKED_AT)).refused
+    if all(first):
+        raise CampaignError(f"the first {len(first)} cases are all refused; case 0: {first[0]}")
     folder = Path(tempfile.mkdtemp(prefix="casadi-gnc-campaign-")) if out is None else Path(out)
     try:
         store = Store(folder, _identity(cases, flights, varying, plan, maths))
@@ -161,8 +166,6 @@ def _fly_missing(
     for number, first, last in missing:
         drawn = cases.draw(first, last)
         good = np.array([not why for why in drawn.refused])
-        if number == 0 and not good.any():
-            raise CampaignError(f"every case is refused; the first: {drawn.refused[0]}")
         begun = done
 
         def counted(count: int, begun: int = begun) -> None:

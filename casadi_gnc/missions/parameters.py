@@ -319,7 +319,8 @@ def _put(at: Any, values: dict[Path, Any]) -> Any:
             try:
                 return type(at)(**given)
             except ValidationError as error:
-                raise ProblemError("; ".join(text for _, text in sentences(error, type(at), given))) from error
+                told = (f"{'.'.join(map(str, path))} {text}" for path, text in sentences(error, type(at), given))
+                raise ProblemError("; ".join(told)) from error
         return at.model_copy(update=new)
     if isinstance(at, ca.DM):
         items = [float(item) for item in at.elements()]

@@ -237,7 +237,10 @@ def test_an_audit_finds_other_words(monkeypatch):
         ({"flights": 0}, "expected 1 to"),
         ({"shard": (4, 3)}, "the shard is 4/3"),
         ({"seed": -1}, "the seed is -1"),
-        ({"dispersions": [DispersionTable(key="truth.inertia_factor", uniform=[-2, -1])]}, "every case is refused"),
+        (
+            {"dispersions": [DispersionTable(key="truth.inertia_factor", uniform=[-2, -1])]},
+            "the first 64 cases are all refused; case 0: inertia_factor is -",
+        ),
     ],
 )
 def test_what_cannot_be_flown_is_told_in_one_sentence(change, told):
