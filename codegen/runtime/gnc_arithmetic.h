@@ -44,6 +44,8 @@ enum gnc_arithmetic_fault {
     GNC_RECIPROCAL = 8 /* a division is a product with the reciprocal */
 };
 
+/* A unit that shall hold no double at all defines GNC_NO_DOUBLE. */
+#ifndef GNC_NO_DOUBLE
 /* Return the faults of arithmetic in double, 0 where it rounds to nearest as IEEE 754 says. Numbers come from a volatile
  * one and go into it, so that the processor computes and not the compiler; nothing overflows or is subnormal. */
 static inline uint32_t gnc_arithmetic_faults(void) {
@@ -73,6 +75,7 @@ static inline uint32_t gnc_arithmetic_faults(void) {
     faults |= (quotient != 0x1.aaaaaaaaaaaabp+0) ? (uint32_t)GNC_RECIPROCAL : 0U;
     return faults;
 }
+#endif
 
 /* The same in float. */
 static inline uint32_t gnc_arithmetic_faultsf(void) {

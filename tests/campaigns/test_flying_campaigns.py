@@ -43,6 +43,11 @@ INERTIA = DispersionTable(key="truth.inertia_factor", normal={"mean": 1.0, "devi
 RATES = DispersionTable(key="initial.rate_rad_per_s", uniform=[-0.05, 0.05])
 
 
+def few_quickly(names):
+    """Return all names, of which the fast tests take the first two."""
+    return [name if i < 2 else pytest.param(name, marks=pytest.mark.slow) for i, name in enumerate(names)]
+
+
 def short(name, samples=200):
     mission = casadi_gnc.load(name)
     return mission.with_timing(duration=samples * mission.timing.sample_period)
@@ -59,7 +64,7 @@ def flown(**options):
     return casadi_gnc.campaign(given.pop("mission"), given.pop("flights"), **given)
 
 
-@pytest.mark.parametrize("name", FLOWN)
+@pytest.mark.parametrize("name", few_quickly(FLOWN))
 def test_lanes_and_threads_have_the_words_of_single_flights(name):
     scheme, keys = FLOWN[name]
     varied = vary(short(name, 60), keys, scheme)
@@ -101,7 +106,9 @@ def vectorised(batch, folder):
 
 
 @pytest.mark.skipif(platform.machine().lower() not in ("x86_64", "amd64"), reason="AVX2 is of x86-64")
-@pytest.mark.parametrize("name", ["huang2020/detumble", "tao2019/case1", "shi2020/docking", "sun2018/circular_orbit"])
+@pytest.mark.parametrize(
+    "name", few_quickly(["huang2020/detumble", "shi2020/docking", "tao2019/case1", "sun2018/circular_orbit"])
+)
 def test_the_loops_over_lanes_are_vector_instructions(name, tmp_path):
     if "Free Software Foundation" not in subprocess.run(["gcc", "--version"], capture_output=True, text=True).stdout:
         pytest.skip("a report of GNU gcc")
@@ -300,6 +307,7 @@ def run(*arguments):
     return subprocess.run(command(*arguments), capture_output=True, text=True, timeout=300)
 
 
+@pytest.mark.slow
 def test_the_command_flies_shows_and_flies_a_case_again(problem, tmp_path):
     out = tmp_path / "mc"
     first = run("campaign", problem, "--flights", 200, "--scheme", "observer_pinv", "--out", out)
@@ -337,7 +345,7 @@ def tables(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("kills", [4, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [pytest.param(4, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.long)])
 def test_killed_at_any_moment_and_run_again_the_tables_are_those_of_an_undisturbed_run(problem, tmp_path, kills):
     assert run(
         "campaign", problem, "--flights", 400, "--scheme", "observer_pinv", "--out", tmp_path / "calm"

@@ -24,7 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 #: Commands by which a section makes what later ones stand on.
-_MAKES = re.compile(r"^(casadi-gnc (new|problems copy|generate|campaign)|mkdir|cp|mv|sed|printf) ")
+_MAKES = re.compile(r"^(casadi-gnc (new|problems copy|generate)|mkdir|cp|mv|sed|printf) ")
 _BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"`([\w./-]+\.\w+)`:$")
 

@@ -136,7 +136,7 @@ def test_float_functions_keep_to_float(name: str, tmp_path: Path):
     source = tmp_path / "only_float.c"
     source.write_text("\n".join(lines) + "\n")
     extra = ["-Wunsuffixed-float-constants"] if is_gnu(compiler(name)) else []
-    options = ["-std=c99", *WARNINGS, "-Wdouble-promotion", *extra, f"-I{RUNTIME}"]
+    options = ["-std=c99", *WARNINGS, "-Wdouble-promotion", "-DGNC_NO_DOUBLE", *extra, f"-I{RUNTIME}"]
     command = [compiler(name), *options, "-c", str(source)]
     result = subprocess.run([*command, "-o", str(tmp_path / "out.o")], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr

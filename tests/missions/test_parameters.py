@@ -24,6 +24,10 @@ KEYS = {
 }
 
 
+#: The fast tests take the first two.
+FEW = [name if i < 2 else pytest.param(name, marks=pytest.mark.slow) for i, name in enumerate(KEYS)]
+
+
 def shortened(name):
     mission = casadi_gnc.load(name)
     return mission.with_timing(duration=60 * mission.timing.sample_period)
@@ -33,9 +37,18 @@ def words(flight):
     return flight.samples.view(np.uint64)
 
 
+class Varied(dict):
+    """Missions by name, each made when it is first asked for."""
+
+    def __missing__(self, name):
+        scheme, own = KEYS[name]
+        self[name] = vary(shortened(name), own, scheme)
+        return self[name]
+
+
 @pytest.fixture(scope="module")
 def varied():
-    return {name: vary(shortened(name), own, scheme) for name, (scheme, own) in KEYS.items()}
+    return Varied()
 
 
 def apart(one, left, right):
@@ -44,7 +57,7 @@ def apart(one, left, right):
     return max(np.abs(left[name] - right[name]).max() / (np.abs(left[name]).max() + 1e-300) for name in names)
 
 
-@pytest.mark.parametrize("name", KEYS)
+@pytest.mark.parametrize("name", FEW)
 def test_at_their_nominal_values_columns_fly_like_the_numbers_to_rounding(varied, name):
     one = varied[name]
     numbers = fly(one.nominal, decimation=1)
@@ -52,7 +65,7 @@ def test_at_their_nominal_values_columns_fly_like_the_numbers_to_rounding(varied
     assert apart(one, numbers, columns) < 1e-6  # the allocator's gap at most; else rounding
 
 
-@pytest.mark.parametrize("name", KEYS)
+@pytest.mark.parametrize("name", FEW)
 def test_other_values_fly_like_a_mission_that_has_them_as_numbers(varied, name):
     one = varied[name]
     values = one.parameters.nominal * (1 + 1e-3 * np.sin(np.arange(one.parameters.size) + 1.0))
@@ -63,7 +76,7 @@ def test_other_values_fly_like_a_mission_that_has_them_as_numbers(varied, name):
     assert apart(one, fly(one.nominal, decimation=1), columns) > 1e-5
 
 
-@pytest.mark.parametrize("name", [name for name in KEYS if name != "huang2020/slew"])
+@pytest.mark.parametrize("name", [one for one in FEW if one != "huang2020/slew"])
 def test_columns_have_the_same_words_in_c_and_on_the_virtual_machine(varied, name):
     one = varied[name]
     flights = [
