@@ -350,7 +350,7 @@ def test_killed_at_any_moment_and_run_again_the_tables_are_those_of_an_undisturb
     assert run(
         "campaign", problem, "--flights", 400, "--scheme", "observer_pinv", "--out", tmp_path / "calm"
     ).returncode == 0  # fmt: skip
-    assert killed(problem, tmp_path / "killed", kills, random.Random(kills)) > kills // 4
+    assert killed(problem, tmp_path / "killed", kills, random.Random(kills)) >= kills // 4
     assert tables(tmp_path / "killed") == tables(tmp_path / "calm")
 
 

@@ -163,7 +163,7 @@ def left_over(place: Path) -> list[str]:
 @pytest.mark.parametrize("name", CASES)
 def test_killed_at_any_moment(name, share, tmp_path):
     case, rng = CASES[name], np.random.default_rng(2020)
-    kills = round(share * case.kills)
+    kills = max(6, round(share * case.kills))
     (tmp_path / "temporary").mkdir()
     case.begin(tmp_path)
     for _ in range(2):  # the first compiles what the cache keeps then
