@@ -40,7 +40,7 @@ def least_cost(problem, command):
 
 
 @pytest.mark.parametrize("only", [True, False], ids=["interior point", "both"])
-@pytest.mark.parametrize("decades", [0, 3])
+@pytest.mark.parametrize("decades", [pytest.param(0, marks=pytest.mark.slow), 3])
 def test_columns_apart_are_certified_and_the_best(decades, only):
     for seed in range(12):
         problem, commands = family(seed, decades)
@@ -51,7 +51,7 @@ def test_columns_apart_are_certified_and_the_best(decades, only):
             assert found.objective <= least_cost(problem, command) * (1 + 1.1e-6)  # and the rounding of both
 
 
-@pytest.mark.parametrize("decades", [0, 3])
+@pytest.mark.parametrize("decades", [pytest.param(0, marks=pytest.mark.slow), 3])
 def test_uncertain_columns_apart_are_certified_by_the_interior_point_alone(decades):
     for seed in range(6):
         problem, commands = family(seed, decades, robust=True)

@@ -193,6 +193,7 @@ def test_reader_may_go_away():
         listing.wait(timeout=60)
 
 
+@pytest.mark.slow
 def test_long_flight_shows_progress_on_a_terminal(tmp_path):
     """A flight of more than a second draws a bar where standard error is a terminal."""
     import pty
