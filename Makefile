@@ -1,14 +1,15 @@
 # make demo     fly the de-tumble mission; pictures and table in out/detumble (the first time about a minute more, to
 #               install what it needs into .venv)
 # make test     style, types and the fast tests: about ten minutes on two cores
-# make test-all style, types and every test; needs clang, clang-tidy, cppcheck, g++ and `make targets`, and skips by
-#               name what a missing one prevents (with CI=true: fails)
+# make test-all style, types and every test; needs clang, clang-tidy, cppcheck, g++ and `make targets`, fetches
+#               600 MB of programs to compare with, and skips by name what a missing one prevents (with CI=true: fails)
 # make test-long  hundreds of kills and thousands of mutated files, of which test-all takes some: some hours
 # make gates    the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers; needs
 #               clang, clang-tidy, cppcheck and g++
 # make targets  compilers and emulators of the flight targets (Debian packages; needs root)
 # make test-oldest  the fast tests with the oldest packages that pyproject.toml allows, in .venv-oldest
-# make lock     the newest packages that pyproject.toml allows, into requirements.lock and requirements-dev.lock
+# make lock     the newest packages that pyproject.toml allows, into requirements.lock, requirements-dev.lock and
+#               requirements-oracles.lock
 # make bench    every solver that is installed, on the shipped sets; report in out/bench/allocation
 # make ratios   every time and ratio that the documentation quotes, into docs/ratios.md
 # make docs     the documentation as a site, in docs/_build
@@ -26,7 +27,7 @@ OUT ?= out
 PYTEST := -m pytest -q -n 2
 test test-all test-long test-oldest: export OPENBLAS_NUM_THREADS = 1
 # Tests that need more than the README asks for, and tests that take long, are in `make test-all` alone.
-FAST := -m 'not tools and not slow and not long'
+FAST := -m 'not tools and not packages and not slow and not long'
 
 demo: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
@@ -34,7 +35,7 @@ demo: .venv/installed
 test: .venv/installed-dev lint
 	$(BIN)/python $(PYTEST) $(FAST)
 
-test-all: .venv/installed-dev lint
+test-all: .venv/installed-oracles lint
 	$(BIN)/python $(PYTEST) -m 'not long'
 
 test-long: .venv/installed-dev
@@ -97,6 +98,12 @@ PIP := -m pip --quiet --disable-pip-version-check install
 	$(BIN)/python $(PIP) --require-hashes --requirement requirements-dev.lock
 	touch $@
 
+# Basilisk alone is 267 MB, and `make test` does without.
+.venv/installed-oracles: .venv/installed-dev requirements-oracles.lock
+	@echo "Installing what tests compare with into .venv: 600 MB more to fetch, a minute or two on a fast connection."
+	$(BIN)/python $(PIP) --require-hashes --requirement requirements-oracles.lock
+	touch $@
+
 # uv resolves for every system and Python at once; it reads settings of its own, not those of pip.
 UV := .venv-uv/bin/uv
 
@@ -108,8 +115,9 @@ COMPILE := $(UV) pip compile --quiet --universal --generate-hashes --python-vers
     --custom-compile-command 'make lock' --group build pyproject.toml
 
 lock: $(UV)
-	$(COMPILE) --extra dev --extra docs --output-file requirements-dev.lock
-	$(COMPILE) --constraints requirements-dev.lock --output-file requirements.lock
+	$(COMPILE) --extra dev --extra docs --extra oracles --output-file requirements-oracles.lock
+	$(COMPILE) --extra dev --extra docs --constraints requirements-oracles.lock --output-file requirements-dev.lock
+	$(COMPILE) --constraints requirements-oracles.lock --output-file requirements.lock
 
 .venv-oldest/installed: pyproject.toml | $(UV)
 	@echo "Installing the oldest packages that pyproject.toml allows into .venv-oldest: about a minute."

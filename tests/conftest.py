@@ -1,5 +1,6 @@
-"""Shared fixtures: random numbers with a seed, compilers, missions loaded once; and the marker `tools`."""
+"""Shared fixtures: random numbers with a seed, compilers, missions loaded once; markers `tools` and `packages`."""
 
+import importlib.util
 import os
 import shutil
 import sys
@@ -18,14 +19,21 @@ sys.path.insert(0, str(Path(__file__).parent / "oracles"))
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Without a program that a test is marked to need fail in CI, and skip by name elsewhere."""
-    named = [program for mark in item.iter_markers("tools") for program in mark.args]
-    lacking = [program for program in named if shutil.which(program) is None]
+    """Without a program or module that a test is marked to need fail in CI, and skip by name elsewhere."""
+    lacking = [name for mark in item.iter_markers("tools") for name in mark.args if shutil.which(name) is None]
+    lacking += [name for mark in item.iter_markers("packages") for name in mark.args if not _importable(name)]
     if lacking:
         text = f"{', '.join(lacking)} is not installed; CONTRIBUTING.md says what `make test-all` needs"
         if os.environ.get("CI") == "true":
             pytest.fail(text, pytrace=False)
         pytest.skip(text)
+
+
+def _importable(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module) is not None
+    except ModuleNotFoundError:  # a part of a package that is not there
+        return False
 
 
 @pytest.fixture
