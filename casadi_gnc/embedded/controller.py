@@ -10,7 +10,7 @@ import casadi as ca
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded.monitor import Monitor
 from casadi_gnc.embedded.names import check_name, check_package, check_parameter
-from casadi_gnc.embedded.printer import Math, Real, c_constant
+from casadi_gnc.embedded.scalars import Math, Real, c_constant
 from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout
 
