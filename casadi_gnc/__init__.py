@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from casadi_gnc.missions.requirements import Requirement, Verdict
     from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
     from casadi_gnc.missions.timing import Noise, Timing
-    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all
+    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all, vary
     from casadi_gnc.problem_files.document import shipped
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.signals import Layout, Signal
@@ -75,6 +75,7 @@ _HOMES = {
     "option": "laws",
     "shipped": "problem_files.document",
     "table": "tables.part",
+    "vary": "problem_files.by_name",
     "verify": "delivery.verifying",
 }
 
@@ -115,6 +116,7 @@ __all__ = [
     "option",
     "shipped",
     "table",
+    "vary",
     "verify",
 ]
 

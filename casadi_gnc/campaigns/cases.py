@@ -16,7 +16,8 @@ from casadi_gnc.campaigns.plan import Plan
 from casadi_gnc.campaigns.plans import Independent, LatinHypercube, Sobol
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.parameters import Varied, numbers_of, vary
+from casadi_gnc.missions.parameters import Varied, vary
+from casadi_gnc.missions.paths import numbers_of
 from casadi_gnc.tables.part import MisfitError
 
 

@@ -16,7 +16,7 @@ from casadi_gnc.campaigns.store import Columns, Store, read_identity, shards
 from casadi_gnc.campaigns.summary import badness, summarised
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.flying import fly_case
+from casadi_gnc.missions.one_build import fly_case
 from casadi_gnc.missions.scheme import Metric
 
 
@@ -29,7 +29,7 @@ class Case:
     cases: Cases = field(repr=False)
 
     def fly(self, **options: Any) -> Flight:
-        """Fly the case with its whole record; options as for `casadi_gnc.missions.flying.fly_case`."""
+        """Fly the case with its whole record; options as for `casadi_gnc.missions.one_build.fly_case`."""
         drawn = self.cases.draw(self.number, self.number + 1)
         if drawn.refused[0]:
             raise CampaignError(f"case {self.number} is refused: {drawn.refused[0]}")

@@ -113,7 +113,7 @@ def _fly_case(campaign: Path, case: str, out: Path | None, decimation: int | Non
 
 def _warn(mission: Mission, chosen: list[str], mode: ModeChoice | None) -> None:
     """Tell before the flight what laws say against their sample period."""
-    from casadi_gnc.missions.flying import cautions
+    from casadi_gnc.missions.noting import cautions
 
     timed = mission.with_timing(mode=mode.value) if mode else mission
     for name in dict.fromkeys(chosen):

@@ -197,6 +197,10 @@ class CompiledEngine:
         """The library; waits for it where it is still being built."""
         return self._library()
 
+    def reseed(self, seed: int) -> None:
+        """Draw the noise of the next flight from another seed."""
+        self._seeds = np.array([seed], dtype=np.uint64)
+
     def configure(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return what follows from these parameters, and the start."""
         assert self._configured is not None

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from importlib import metadata
 from typing import Any
 
@@ -16,14 +14,12 @@ from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.missions import metrics, tapes
 from casadi_gnc.missions.engines import REGISTRY, Carried, CompiledEngine, Engine
 from casadi_gnc.missions.flight import Flight
+from casadi_gnc.missions.judging import judges_of, verdicts
 from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.parameters import Varied
-from casadi_gnc.missions.recording import funnel_signals
-from casadi_gnc.missions.requirements import Judge, Verdict
+from casadi_gnc.missions.noting import cautions, left_funnels, undefined
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.timing import Mode
-from casadi_gnc.status import StepStatus
 
 EngineName = Any
 Progress = Callable[[int, int], None]
@@ -73,35 +69,12 @@ def fly(
         mission = mission.with_timing(mode=mode)
     chosen = mission.scheme(scheme)
     built = tapes.tapes_of(mission, chosen)
-    runner, notes = _engine(mission, chosen, built, engine, maths)
+    runner, notes = engine_of(mission, chosen, built, engine, maths)
     carried = begin(mission, built, runner)
-    return _flown(mission, chosen, built, runner, carried, decimation, maths, notes, progress)
+    return flown(mission, chosen, built, runner, carried, decimation, maths, notes, progress)
 
 
-def fly_case(
-    varied: Varied,
-    values: Sequence[float] | np.ndarray,
-    seed: int,
-    *,
-    engine: EngineName = "c",
-    maths: Math = "gnc",
-    decimation: int | None = None,
-    progress: Progress | None = None,
-) -> Flight:
-    """Fly a mission whose parameters are columns with some values of them, noise drawn from `seed`.
-
-    The text that flies is that of every other case: the words are those of a batch. Other arguments as for `fly`.
-    """
-    mission = replace(varied.mission, noise=replace(varied.mission.noise, seed=seed), parts=varied.mission.parts_asked)
-    chosen = mission.schemes[0]
-    built = varied.tapes
-    runner, notes = _engine(mission, chosen, built, engine, maths)
-    carried = begin(mission, built, runner, np.array(values, dtype=float))
-    every = mission.timing.record_every if decimation is None else decimation
-    return _flown(mission, chosen, built, runner, carried, every, maths, notes, progress, told_of=varied.nominal)
-
-
-def _flown(
+def flown(
     mission: Mission,
     chosen: Scheme,
     built: tapes.Tapes,
@@ -113,27 +86,27 @@ def _flown(
     progress: Progress | None,
     told_of: Mission | None = None,
 ) -> Flight:
-    """Run all samples; `told_of` is the mission in numbers where the flown one has symbols."""
+    """Run all samples and gather what came out; `told_of` is the mission in numbers where the flown one has symbols."""
     known = told_of or mission
     total, chunk = mission.timing.samples, _CHUNK if built.symbolic else 200
     record = _room(-(-total // decimation), built.row.size)
-    judges = _judges(mission, built)
-    started, flown = time.perf_counter(), 0
-    while flown < total:
-        count = min(chunk if progress or total > _CHUNK else total, total - flown)
-        kept = -(-flown // decimation)
+    judges = judges_of(mission, built)
+    started, done = time.perf_counter(), 0
+    while done < total:
+        count = min(chunk if progress or total > _CHUNK else total, total - done)
+        kept = -(-done // decimation)
         if judges:
             every = np.zeros((count, built.row.size))
-            runner.run(carried, flown, count, 1, every)
-            thinned = every[-flown % decimation :: decimation]
+            runner.run(carried, done, count, 1, every)
+            thinned = every[-done % decimation :: decimation]
             record[kept : kept + len(thinned)] = thinned
             for judge in judges:
                 judge.take(every)
-            flown += count
+            done += count
         else:
-            flown += runner.run(carried, flown, count, decimation, record[kept:])
+            done += runner.run(carried, done, count, decimation, record[kept:])
         if progress:
-            progress(flown, total)
+            progress(done, total)
     seconds = time.perf_counter() - started
     made = {
         "engine": runner.name,
@@ -150,7 +123,7 @@ def _flown(
     raised = metrics.statuses(built.tally, carried.tally)
     values = metrics.read(tuple(mission.metrics), built.tally, carried.tally, (total - 1) * period, period)
     return Flight(
-        mission=mission.name,
+        mission=known.name,
         scheme=chosen.name,
         title=chosen.title or chosen.name,
         layout=built.row,
@@ -164,41 +137,11 @@ def _flown(
             *known.craft.notes(),
             *cautions(known.scheme(chosen.name)),
             *notes,
-            *_undefined(mission, values, raised),
-            *_left(mission, built, record),
+            *undefined(mission, values, raised),
+            *left_funnels(mission, built, record),
         ),
-        verdicts=_verdicts(mission, built, carried.tally, values, judges),
+        verdicts=verdicts(mission, built, carried.tally, values, judges),
     )
-
-
-def _judges(mission: Mission, built: tapes.Tapes) -> list[Judge]:
-    """Return what judges those requirements over signals that are not in the tally; it needs every sample."""
-    watched = [one.requirement for one in built.watches]
-    rest = [one for one in mission.requirements if one.formula and one not in watched]
-    return [Judge(one, built.row, mission.timing.sample_period) for one in rest]
-
-
-def _verdicts(
-    mission: Mission, built: tapes.Tapes, tally: np.ndarray, values: dict[str, float | None], judges: list[Judge]
-) -> dict[str, Verdict]:
-    """Return the verdict of every requirement, by its id, in the mission's order; a flight that diverged meets none."""
-    units = {metric.name: metric.unit for metric in mission.metrics}
-    asked = [one for one in mission.requirements if one.metric]
-    found = [Verdict(one, one.robustness(values), units[one.metric]) for one in asked]
-    found += [
-        Verdict(one.requirement, float(one.read(tally[built.tally.place(one.name)])), one.unit) for one in built.watches
-    ]
-    found += [judge.verdict() for judge in judges]
-    if StepStatus.DIVERGED in metrics.statuses(built.tally, tally):
-        found = [replace(verdict, robustness=-math.inf) for verdict in found]
-    by_id = {verdict.requirement.id: verdict for verdict in found}
-    return {one.id: by_id[one.id] for one in mission.requirements}
-
-
-def cautions(scheme: Scheme) -> tuple[str, ...]:
-    """Return what the law of a scheme says against its sample period before it flies, a sentence each."""
-    found = (check for check in scheme.law.checks() if check.name.startswith("sampling."))
-    return tuple(f"{check.consequence} {check.remedy}" for check in found if check.verdict in ("warn", "fail"))
 
 
 def _room(rows: int, columns: int) -> np.ndarray:
@@ -229,9 +172,10 @@ def begin(mission: Mission, built: tapes.Tapes, runner: Engine, values: np.ndarr
     )
 
 
-def _engine(
+def engine_of(
     mission: Mission, scheme: Scheme, built: tapes.Tapes, engine: EngineName, maths: Math
 ) -> tuple[Engine, tuple[str, ...]]:
+    """Return the engine of a name or class, made for a scheme, and what is to be told of the choice."""
     kind = REGISTRY.find(engine)
     if kind is not CompiledEngine:
         return kind(mission, scheme, built), ()
@@ -240,39 +184,6 @@ def _engine(
     except NoCompilerError as error:
         note = f"{error}. Flown on CasADi's virtual machine instead: some hundred times slower, with libm's last bits"
         return VirtualMachineEngine(mission, scheme, built), (note,)
-
-
-def _undefined(
-    mission: Mission, values: dict[str, float | None], raised: dict[StepStatus, tuple[int, float]]
-) -> tuple[str, ...]:
-    """Return a sentence for every metric that has no value."""
-    if StepStatus.DIVERGED in raised:
-        return (f"diverged at {raised[StepStatus.DIVERGED][1]:g} s: no metric of this flight has a value",)
-    end, notes = mission.timing.duration, []
-    for metric in mission.metrics:
-        if values[metric.name] is None and metric.kind == "settling":
-            notes.append(f"{metric.name}: never; at {end:g} s {metric.signal} was still above {metric.threshold:g}")
-        elif metric.after > end:
-            notes.append(f"{metric.name}: none; it looks from {metric.after:g} s on, and the flight ends at {end:g} s")
-        elif values[metric.name] is None:
-            notes.append(f"{metric.name}: none; no finite sample of {metric.signal} from {metric.after:g} to {end:g} s")
-    return tuple(notes)
-
-
-def _left(mission: Mission, built: tapes.Tapes, record: np.ndarray) -> tuple[str, ...]:
-    """Return for every funnel that was left, as far as samples were kept, when and on which axis first."""
-    notes, time = [], record[:, built.row.place("time")][:, 0]
-    for funnel in mission.funnels:
-        if funnel.signal not in built.row:
-            continue
-        lower, upper = (record[:, built.row.place(name)] for name in funnel_signals(mission, funnel).names[:2])
-        signal = record[:, built.row.place(funnel.signal)]
-        outside = ~((signal > lower) & (signal < upper))
-        if outside.any():
-            first = int(outside.any(axis=1).argmax())
-            axes = " and ".join(str(axis) for axis in np.flatnonzero(outside[first]) + 1)
-            notes.append(f"{funnel.signal} was outside its funnel from {time[first]:g} s on axis {axes} on")
-    return tuple(notes)
 
 
 def fly_all(mission: Mission, **options: Any) -> list[Flight]:

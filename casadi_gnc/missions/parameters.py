@@ -8,39 +8,26 @@ library, for all their values; what follows from them alone is computed once a f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
-from pydantic import ValidationError
 
 from casadi_gnc.embedded.printer import print_function
-from casadi_gnc.errors import FlightError, GncError, ProblemError
-from casadi_gnc.laws import Law, gains_of
-from casadi_gnc.mathematics.exact import array, is_number
+from casadi_gnc.errors import FlightError, GncError
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.parts import Parts
+from casadi_gnc.missions.paths import changed, number_at, numbers_of
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.tapes import Tapes, tapes_of
-from casadi_gnc.tables.complaints import near_key, sentences
-from casadi_gnc.tables.part import MisfitError, Part, own_tables
+from casadi_gnc.tables.part import MisfitError, Part
 
 if TYPE_CHECKING:
-    from casadi_gnc.missions.craft import Craft
     from casadi_gnc.missions.mission import Mission
-
-Path = tuple[str | int, ...]
-
-#: Tables of a file whose numbers shape the flight itself, and what to say of each.
-_SHAPES = {
-    "timing": "sizes and steps follow from it; fly a mission for each value",
-    "noise": "every case draws noise of its own, from the campaign's seed and its number",
-    "funnel": "walls are compiled; fly a mission for each",
-    "metric": "it asks a question and changes no flight",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +110,7 @@ class Varied:
 
     def _refusal(self, values: np.ndarray) -> str:
         try:
-            _changed(self.nominal, dict(zip(self.parameters.keys, map(float, values), strict=True)))
+            changed(self.nominal, dict(zip(self.parameters.keys, map(float, values), strict=True)))
         except GncError as error:
             return str(error)
         return ""
@@ -175,7 +162,7 @@ def _varied(mission: Mission, keys: Sequence[str]) -> Varied:
     """Return a mission with symbols at whole paths, once its tapes could be built and printed."""
     symbols = [ca.SX.sym(key.replace(".", "_")) for key in keys]
     column = ca.vertcat(*symbols) if symbols else ca.SX(0, 1)
-    nominal = np.array([_at(mission, key) for key in keys])
+    nominal = np.array([number_at(mission, key) for key in keys])
     try:
         varied = _with(mission, dict(zip(keys, symbols, strict=True)))
         made = Varied(mission, varied, Parameters(tuple(keys), column, nominal))
@@ -189,82 +176,9 @@ def _varied(mission: Mission, keys: Sequence[str]) -> Varied:
     return made
 
 
-def numbers_of(mission: Mission, key: str) -> list[str]:
-    """Return the whole path of every number that a key of a mission of one scheme stands for, in order."""
-    root, *rest = key.split(".")
-    if root in _SHAPES:
-        raise FlightError(f"{key!r} cannot be a column: {_SHAPES[root]}")
-    found = list(_leaves(_root(mission, root, key), rest, (root,), key))
-    if not found:
-        raise FlightError(f"{key!r} leads to no number")
-    return found
-
-
-def _root(mission: Mission, root: str, key: str) -> Any:
-    craft = mission.craft
-    own = own_tables(type(craft))
-    if root == "scheme":
-        return {each.name: {"law": each.law} for each in mission.schemes}
-    if root == "spacecraft":
-        return {name: getattr(craft, name) for name in type(craft).model_fields if name not in own}
-    if root in own:
-        return getattr(craft, root)
-    raise FlightError(f"{key!r} leads nowhere: the mission has no {root!r}{near_key(root, [*own, *_ROOTS])}")
-
-
-_ROOTS = ("spacecraft", "scheme")
-
-
-def _leaves(at: Any, rest: list[str], done: tuple[str, ...], key: str) -> Iterator[str]:
-    """Yield the paths of the numbers below a place; a `*` stands for every item there."""
-    if rest:
-        parts = _parts(at)
-        if rest[0] == "*":
-            if not parts:
-                raise FlightError(f"{key!r} leads nowhere: {'.'.join(done)} has no parts")
-            for name, part in parts.items():
-                yield from _leaves(part, rest[1:], (*done, name), key)
-            return
-        if rest[0] not in parts:
-            known = near_key(rest[0], list(parts)) or (f"; there is {', '.join(parts)}" if parts else "")
-            raise FlightError(f"{key!r} leads nowhere: {'.'.join(done)} has no {rest[0]!r}{known}")
-        yield from _leaves(parts[rest[0]], rest[1:], (*done, rest[0]), key)
-    elif isinstance(at, (int, float)) and not isinstance(at, bool):
-        yield ".".join(done)
-    elif at is None:
-        raise FlightError(f"{key!r} has no value to start from: {'.'.join(done)} is left out; write its nominal value")
-    elif isinstance(at, (list, tuple, ca.DM)):
-        for name, part in _parts(at).items():
-            yield from _leaves(part, [], (*done, name), key)
-    else:
-        raise FlightError(f"{key!r} leads to {'.'.join(done)}, which is no number and no list of numbers")
-
-
-def _parts(at: Any) -> dict[str, Any]:
-    """Return what a path may go on to: fields, gains, and items by their number from 1."""
-    if isinstance(at, Part):
-        return {name: getattr(at, name) for name in type(at).model_fields}
-    if isinstance(at, dict):
-        return at
-    if isinstance(at, (list, tuple)):
-        return {str(i): item for i, item in enumerate(at, 1)}
-    if isinstance(at, ca.DM) and at.shape[1] == 1:
-        return {str(i): float(item) for i, item in enumerate(at.elements(), 1)}
-    return {name: getattr(at, name) for name in gains_of(type(at))} if isinstance(at, Law) else {}
-
-
-def _at(mission: Mission, key: str) -> float:
-    """Return the number at a whole path."""
-    root, *rest = key.split(".")
-    place = _root(mission, root, key)
-    for name in rest:
-        place = _parts(place)[name]
-    return float(place)
-
-
 def _with(mission: Mission, values: dict[str, Any]) -> Mission:
     """Return a mission with other numbers, or symbols, at whole paths."""
-    craft, laws = _changed(mission, values)
+    craft, laws = changed(mission, values)
     parts = Parts(craft)
     schemes = []
     for each in mission.schemes:
@@ -276,53 +190,9 @@ def _with(mission: Mission, values: dict[str, Any]) -> Mission:
     return replace(mission, craft=craft, schemes=schemes, parts=parts)
 
 
-def _changed(mission: Mission, values: dict[str, Any]) -> tuple[Craft, dict[str, Law]]:
-    """Return craft and laws with other numbers, which are validated, or with symbols, which nothing validates."""
-    of_craft = {_of_craft(key): value for key, value in values.items() if not key.startswith("scheme.")}
-    craft = _put(mission.craft, of_craft) if of_craft else mission.craft
-    laws = {}
-    for each in mission.schemes:
-        start = f"scheme.{each.name}."
-        own = {tuple(key.split(".")[3:]): value for key, value in values.items() if key.startswith(start)}
-        gains = {
-            name: _put(getattr(each.law, name), {path[1:]: value for path, value in own.items() if path[0] == name})
-            for name in dict.fromkeys(path[0] for path in own)
-        }
-        laws[each.name] = replace(each.law, **gains) if gains else each.law
-    return craft, laws
-
-
-def _of_craft(key: str) -> Path:
-    path = tuple(int(part) - 1 if part.isdecimal() else part for part in key.split("."))
-    return path[1:] if path[0] == "spacecraft" else path
-
-
 def _actuation(keys: Part, parts: Parts) -> Actuation:
     """Return how a scheme with these keys makes efforts: as its craft believes."""
     try:
         return parts.actuation(keys)
     except (GncError, MisfitError) as error:
         raise FlightError(f"the actuators as the flight software knows them follow from it ({error})") from error
-
-
-def _put(at: Any, values: dict[Path, Any]) -> Any:
-    """Return a part, a list or a column with what the paths lead to replaced."""
-    if () in values:
-        return values[()]
-    below: dict[str | int, dict[Path, Any]] = {}
-    for path, value in values.items():
-        below.setdefault(path[0], {})[path[1:]] = value
-    if isinstance(at, Part):
-        new = {str(name): _put(getattr(at, str(name)), inner) for name, inner in below.items()}
-        if all(is_number(value) for value in values.values()):
-            given = {**{name: getattr(at, name) for name in type(at).model_fields}, **new}
-            try:
-                return type(at)(**given)
-            except ValidationError as error:
-                told = (f"{'.'.join(map(str, path))} {text}" for path, text in sentences(error, type(at), given))
-                raise ProblemError("; ".join(told)) from error
-        return at.model_copy(update=new)
-    if isinstance(at, ca.DM):
-        items = [float(item) for item in at.elements()]
-        return array(_put(items, {(int(path[0]) - 1, *path[1:]): value for path, value in values.items()}))
-    return [_put(item, below[i]) if i in below else item for i, item in enumerate(at)]

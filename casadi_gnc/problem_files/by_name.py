@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +12,10 @@ from casadi_gnc import checking
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import CampaignError, ProblemError
 from casadi_gnc.missions import flying
+from casadi_gnc.missions import parameters as columns
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.one_build import OneBuild
 from casadi_gnc.problem_files.boundary import about
 from casadi_gnc.problem_files.loading import load
 
@@ -72,6 +75,28 @@ def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Chec
     """
     with _about(problem):
         return checking.check(mission_of(problem, strict=False), scheme)
+
+
+def vary(
+    problem: str | Path | Mission, keys: str | Sequence[str], scheme: str | None = None, **options: Any
+) -> OneBuild:
+    """Return one build of a scheme, which may be given by its file, that flies with any values of some numbers.
+
+    Parameters
+    ----------
+    problem : a mission, a problem file, or the name of a shipped one.
+    keys : paths, as of a `[[dispersion]]`; one that leads to a list stands for all numbers there.
+    scheme : its name; the first one of the mission by default.
+    options : engine and maths, as for `fly`.
+
+    Examples
+    --------
+    >>> build = vary("huang2020/detumble", ["scheme.observer_pinv.law.rate_gain"], "observer_pinv")
+    >>> [build.fly({"scheme.observer_pinv.law.rate_gain": gain}).metrics["settling_time"] for gain in (0.5, 0.6)]
+    [968.7, 967.8000000000001]
+    """
+    with _about(problem):
+        return OneBuild(columns.vary(mission_of(problem), [keys] if isinstance(keys, str) else keys, scheme), **options)
 
 
 def _about(problem: Any) -> AbstractContextManager[None]:

@@ -1,6 +1,8 @@
 """Fly a problem file once for each value of a key, as its [[sweep]] tables say.
 
-A sweep is nothing but changed copies of the file's content, checked and built like the file itself.
+A sweep is nothing but changed copies of the file's content, each checked like the file itself. Where the key's numbers
+can be columns of the flight, one build serves all values; where a size, a limit or a choice follows from them, each
+value has its own.
 """
 
 from __future__ import annotations
@@ -11,10 +13,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from casadi_gnc.errors import ProblemError
+import numpy as np
+
+from casadi_gnc.errors import FlightError, ProblemError
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.flying import fly
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.one_build import OneBuild
+from casadi_gnc.missions.parameters import vary
+from casadi_gnc.missions.timing import Mode
 from casadi_gnc.problem_files.document import read_kind
 from casadi_gnc.problem_files.loading import check_tables, load_document
 from casadi_gnc.status import StepStatus
@@ -88,14 +95,33 @@ def fly_sweep(
     """
     names = list(schemes) or [scheme.name for scheme in sweep.missions[0].schemes]
     rows: list[dict[str, Flight]] = []
-    for mission in sweep.missions:
+    builds = {name: _one_build(sweep, name, **options) for name in names}
+    for mission, value in zip(sweep.missions, sweep.values, strict=True):
         row = {}
         for name in names:
-            row[name] = fly(mission, name, **{**options, "decimation": mission.timing.samples})
+            build, few = builds[name], mission.timing.samples
+            if build is None:
+                row[name] = fly(mission, name, **{**options, "decimation": few})
+            else:
+                values = np.full(len(build.keys), float(value))
+                row[name] = build.fly_row(values, mission.noise.seed, decimation=few, told_of=mission)
             if told:
                 told(len(rows) * len(names) + len(row), len(sweep.missions) * len(names))
         rows.append(row)
     return rows
+
+
+def _one_build(sweep: Sweep, scheme: str, mode: Mode | None = None, **options: Any) -> OneBuild | None:
+    """Return the one build that flies a scheme with any value of a sweep; None where each value needs its own."""
+    if len(sweep.values) < 2 or not all(type(value) in (int, float) for value in sweep.values):
+        return None
+    mission = sweep.missions[0]
+    try:
+        return OneBuild(
+            vary(mission if mode is None else mission.with_timing(mode=mode), [sweep.key], scheme), **options
+        )
+    except FlightError:
+        return None
 
 
 def save_sweeps(folder: Path, flown: Sequence[tuple[Sweep, list[dict[str, Flight]]]]) -> Path:

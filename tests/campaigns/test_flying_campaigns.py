@@ -24,7 +24,7 @@ from casadi_gnc.campaigns import DispersionTable
 from casadi_gnc.campaigns.campaign import shard_size
 from casadi_gnc.campaigns.engines import VECTORS, CompiledBatch, best_vectors
 from casadi_gnc.errors import CampaignError
-from casadi_gnc.missions.flying import fly_case
+from casadi_gnc.missions.one_build import fly_case
 from casadi_gnc.missions.parameters import vary
 from casadi_gnc.missions.requirements import Requirement
 

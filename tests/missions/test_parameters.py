@@ -7,7 +7,8 @@ import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import FlightError, GncError
-from casadi_gnc.missions.flying import fly, fly_case
+from casadi_gnc.missions.flying import fly
+from casadi_gnc.missions.one_build import fly_case
 from casadi_gnc.missions.parameters import vary
 
 #: Keys of each kind, by mission: truth, environment, start, orbit, sensors, faults, gains.

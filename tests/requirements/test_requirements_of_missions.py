@@ -12,7 +12,7 @@ import casadi_gnc as gnc
 from casadi_gnc.campaigns.engines import CompiledBatch
 from casadi_gnc.cli.main import app
 from casadi_gnc.errors import FlightError, ProblemError, RequirementError
-from casadi_gnc.missions.flying import fly_case
+from casadi_gnc.missions.one_build import fly_case
 from casadi_gnc.missions.parameters import vary
 from casadi_gnc.missions.tapes import tapes_of
 from casadi_gnc.problem_files.document import locate

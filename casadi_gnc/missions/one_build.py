@@ -1,0 +1,138 @@
+"""Fly a mission again and again with other numbers, from one build."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.embedded.printer import Math
+from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics.arrays import real_array
+from casadi_gnc.missions.engines import CompiledEngine
+from casadi_gnc.missions.flight import Flight
+from casadi_gnc.missions.flying import EngineName, Progress, begin, engine_of, flown
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.parameters import Varied
+
+
+class OneBuild:
+    """Hold a mission of one scheme in which some numbers are columns, and the engine that flies it.
+
+    Made by `casadi_gnc.vary`. A flight takes the time of a flight, whatever its numbers are: nothing is compiled again.
+    At the nominal numbers it agrees with that of `fly` to rounding, for the C of that one has folded constants.
+
+    Parameters
+    ----------
+    varied : from `casadi_gnc.missions.parameters.vary`.
+    engine, maths : as for `casadi_gnc.missions.flying.fly`.
+    """
+
+    def __init__(self, varied: Varied, *, engine: EngineName = "c", maths: Math = "gnc") -> None:
+        self.varied, self._engine = varied, engine
+        self._maths: Math = maths
+        self._made: CompiledEngine | None = None
+        self._notes: tuple[str, ...] = ()
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The whole path of each number that can be given."""
+        return self.varied.parameters.keys
+
+    def __repr__(self) -> str:
+        return f"OneBuild({self.varied!r})"
+
+    def fly(self, values: Mapping[str, Any] | None = None, *, seed: int | None = None, **options: Any) -> Flight:
+        """Fly with other numbers.
+
+        Parameters
+        ----------
+        values : by key: a number, or as many as the key stands for; numbers that are not given are those of the file.
+        seed : of the noise; the mission's own by default.
+        options : decimation and progress, as for `casadi_gnc.missions.flying.fly`.
+
+        Raises
+        ------
+        FlightError
+            For a key that is no column, and numbers that no such craft or law can have.
+        """
+        row = self.row(values or {})
+        refused = self.varied.refusals(row[None, :])[0]
+        if refused:
+            raise FlightError(refused)
+        nominal = self.varied.nominal
+        known = self.varied.at(row) if values else nominal
+        return self.fly_row(row, nominal.noise.seed if seed is None else seed, told_of=known, **options)
+
+    def row(self, values: Mapping[str, Any]) -> np.ndarray:
+        """Return the number of every column, (P,); arguments and errors as for `fly`."""
+        row = self.varied.parameters.nominal.copy()
+        for key, value in values.items():
+            places = [i for i, known in enumerate(self.keys) if known == key or known.startswith(f"{key}.")]
+            if not places:
+                raise FlightError(f"{key!r} is no column of this build; there is {', '.join(self.keys)}")
+            numbers = real_array(key, value, FlightError).ravel()
+            if numbers.size not in (1, len(places)):
+                raise FlightError(f"{key!r} stands for {len(places)} numbers, and {numbers.size} are given")
+            row[places] = numbers
+        return row
+
+    def fly_row(
+        self,
+        row: Sequence[float] | np.ndarray,
+        seed: int,
+        *,
+        decimation: int | None = None,
+        progress: Progress | None = None,
+        told_of: Mission | None = None,
+    ) -> Flight:
+        """Fly with a number for every column, which are not looked at again.
+
+        Parameters
+        ----------
+        row : (P,).
+        seed : of the noise.
+        decimation, progress : as for `casadi_gnc.missions.flying.fly`.
+        told_of : mission in numbers whose name, digest and cautions the flight is told with; the nominal one.
+        """
+        varied = self.varied
+        mission = replace(
+            varied.mission, noise=replace(varied.mission.noise, seed=seed), parts=varied.mission.parts_asked
+        )
+        runner = self._runner(mission)
+        carried = begin(mission, varied.tapes, runner, np.array(row, dtype=float))
+        every = mission.timing.record_every if decimation is None else decimation
+        known = told_of or varied.nominal
+        return flown(
+            mission, mission.schemes[0], varied.tapes, runner, carried, every, self._maths, self._notes, progress, known
+        )
+
+    def _runner(self, mission: Mission) -> Any:
+        """Return the engine: the compiled one is made once, and given the seed of each flight."""
+        if self._made is None:
+            made, self._notes = engine_of(mission, mission.schemes[0], self.varied.tapes, self._engine, self._maths)
+            if not isinstance(made, CompiledEngine):
+                return made
+            self._made = made
+        self._made.reseed(mission.noise.seed)
+        return self._made
+
+
+def fly_case(
+    varied: Varied,
+    values: Sequence[float] | np.ndarray,
+    seed: int,
+    *,
+    engine: EngineName = "c",
+    maths: Math = "gnc",
+    decimation: int | None = None,
+    progress: Progress | None = None,
+) -> Flight:
+    """Fly a mission whose parameters are columns with some values of them, noise drawn from `seed`.
+
+    The text that flies is that of every other case: the words are those of a batch. Other arguments as for
+    `casadi_gnc.missions.flying.fly`.
+    """
+    return OneBuild(varied, engine=engine, maths=maths).fly_row(values, seed, decimation=decimation, progress=progress)
