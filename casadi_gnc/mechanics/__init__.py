@@ -1,6 +1,6 @@
 """Bodies and what moves them: attitude, rigid bodies, wheels, thrusters, dipoles, orbits, disturbances, faults."""
 
-from casadi_gnc.mechanics import attitude, dipoles
+from casadi_gnc.mechanics import attitude, dipoles, earth, geomagnetic, orbits, quaternions
 from casadi_gnc.mechanics.actuator_faults import ActuatorFault, FaultSchedule
 from casadi_gnc.mechanics.circular_orbit import CircularOrbit
 from casadi_gnc.mechanics.disturbances import Harmonics, OrbitalDisturbance
@@ -25,5 +25,9 @@ __all__ = [
     "WheelArray",
     "attitude",
     "dipoles",
+    "earth",
+    "geomagnetic",
     "inverse3",
+    "orbits",
+    "quaternions",
 ]
