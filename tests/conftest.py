@@ -44,7 +44,11 @@ def rng() -> np.random.Generator:
 @pytest.fixture(scope="session", autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory):
     """Keep compiled libraries of a test run away from the user's cache."""
-    folder = tmp_path_factory.mktemp("cache")
+    folder = tmp_path_factory.getbasetemp()
+    folder = (
+        folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    ) / "cache"  # one for all processes of a run
+    folder.mkdir(mode=0o700, exist_ok=True)
     before = os.environ.get("CASADI_GNC_CACHE")
     os.environ["CASADI_GNC_CACHE"] = str(folder)
     yield folder

@@ -6,6 +6,7 @@ from running_pages import run, sections
 PAGE = "campaigns.md"
 
 
+@pytest.mark.slow  # first_law is the page that the fast tests run
 @pytest.mark.parametrize("section", [section.title for section in sections(PAGE)])
 def test_section(section, tmp_path):
     run(PAGE, section, tmp_path)

@@ -29,6 +29,7 @@ def installed(folder):
     return about.parent
 
 
+@pytest.mark.slow  # first_law is the page that the fast tests run
 @pytest.mark.parametrize("section", SECTIONS)
 def test_section(section, tmp_path):
     packages = {"PYTHONPATH": str(installed(tmp_path))} if section == "As a package" else {}

@@ -247,6 +247,7 @@ def test_folder_that_is_no_package(text, tmp_path):
         verify(tmp_path)
 
 
+@pytest.mark.slow
 def test_verify_notices_a_changed_constant(tmp_path):
     """A package whose C no longer does what its vectors say."""
     folder = copied(made(*PLAIN), tmp_path)

@@ -176,8 +176,14 @@ def test_notes_of_a_user_are_told_and_no_fault(folder):
     ("code", "sentence"),
     [
         ("abort();", "cannot be run as .*: its code, in a process of its own, was ended by SIGABRT"),
-        ("for (;;) {}", "its code, in a process of its own, did not end within 3 s"),
-        ("exit(0);", "its code, in a process of its own, ended with code 0 and without an answer"),
+        pytest.param(
+            "for (;;) {}", "its code, in a process of its own, did not end within 3 s", marks=pytest.mark.slow
+        ),
+        pytest.param(
+            "exit(0);",
+            "its code, in a process of its own, ended with code 0 and without an answer",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_code_that_crashes_or_hangs_is_told(code, sentence, folder, monkeypatch):
@@ -317,6 +323,7 @@ def test_a_pipe_does_not_hang(folder):
     assert package.edited(folder) == ["README.md (changed)"]
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_1(folder):
     signed(folder, title="another")
     command = [sys.executable, "-m", "casadi_gnc.cli.main", "verify", folder]

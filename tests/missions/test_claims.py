@@ -19,6 +19,7 @@ def test_flight_is_the_hand_written_one(detumble, feedback):
         assert np.allclose(flight[name], by_hand[name], rtol=0, atol=1e-11), name
 
 
+@pytest.mark.slow
 def test_settled_flight_is_the_hand_written_one(detumble):
     flight = casadi_gnc.fly(detumble, "observer_pinv")
     by_hand = oracle.fly(15001)

@@ -39,6 +39,7 @@ def test_table_2_as_far_as_it_can_be_met():
     assert StepStatus.FUNNEL_LEFT not in flight.statuses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("problem", "scheme"), [("case1", "funnels"), ("case2", "auxiliary")])
 def test_mean_error_does_not_depend_on_the_step(problem, scheme):
     """Endpoint values swing and move by 5 % with the step; the mean of the last 10 s does not."""
@@ -67,6 +68,7 @@ def test_funnels_are_kept_only_with_prescribed_performance(case1):
     assert 5 < plain.statuses[StepStatus.FUNNEL_LEFT][1] < 10
 
 
+@pytest.mark.slow
 def test_what_saturation_handling_does(case2):
     """Simulated independently: commands of 115 N with the auxiliary system, 40 N clipped, 17.7 N unlimited."""
     short = case2.with_timing(duration=3.0)
@@ -97,7 +99,12 @@ def sweeps():
     return {sweep.name: sweep for sweep in load_sweeps("tao2019/sweeps")}
 
 
-@pytest.mark.parametrize(("name", "scheme"), FIRST_LEFT)
+QUICK = [("force", "clipped"), ("torque", "auxiliary")]
+
+
+@pytest.mark.parametrize(
+    ("name", "scheme"), [case if case in QUICK else pytest.param(*case, marks=pytest.mark.slow) for case in FIRST_LEFT]
+)
 def test_first_violations(sweeps, name, scheme):
     expected, sweep = FIRST_LEFT[name, scheme], sweeps[name]
     kept = [i for i, value in enumerate(sweep.values) if value in expected]

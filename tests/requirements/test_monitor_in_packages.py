@@ -115,7 +115,7 @@ def test_a_million_samples_have_the_verdicts_of_python(tmp_path):
     assert wrong == 0
 
 
-@pytest.mark.parametrize("real", ["float64", "float32"])
+@pytest.mark.parametrize("real", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_a_package_is_made_replayed_and_verified_with_its_monitor(tmp_path, real):
     path = tmp_path / "mine.toml"
     tables = "".join(f'\n[[requirement]]\nid = "{name}"\nformula = "{text}"\n' for name, text in FORMULAS.items())

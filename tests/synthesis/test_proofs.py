@@ -25,7 +25,10 @@ def slow(rate, margin):
     return lmis
 
 
-@pytest.mark.parametrize("backend", ["clarabel", "scs", "barrier"])
+@pytest.mark.parametrize(
+    "backend",
+    ["clarabel", pytest.param("scs", marks=pytest.mark.slow), pytest.param("barrier", marks=pytest.mark.slow)],
+)
 def test_a_slow_mode_is_refuted_by_nobody(backend):
     for rate in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
         for margin in (1e-9, 1e-7, 1e-5):

@@ -81,6 +81,7 @@ def assert_sentence(done, *words):
         assert str(word) in done.stderr
 
 
+@pytest.mark.slow
 def test_no_home_and_an_unknown_user(place):
     assert run(place, ALLOCATE, prelude=UNKNOWN_USER).stdout == answer()
     assert run(place, ALLOCATE, prelude=UNKNOWN_USER, HOME="").stdout == answer()
