@@ -141,7 +141,7 @@ class CompiledBatch:
         plant = mission.truth
         self._widths = {
             "x": plant.state.size,
-            "m": scheme.law.memory.size,
+            "m": scheme.flown.memory.size,
             "actuators": plant.inputs.size,
             "good": plant.measurement.size,
             "tally": tapes.tally.size,

@@ -21,6 +21,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.describing import shortened
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.plant import Plant
+from casadi_gnc.navigation import Navigation
 from casadi_gnc.registry import Registry
 from casadi_gnc.tables.allocation import Pinv, Robust
 from casadi_gnc.tables.complaints import sentences
@@ -80,6 +81,10 @@ class Craft(Part):
 
     def belief(self) -> Any:
         """Return what the flight software believes of the craft; laws that have a field `body` are given it."""
+        return None
+
+    def navigation(self) -> Navigation | None:
+        """Return what stands between the measurement and the laws; None: laws read the measurement itself."""
         return None
 
     def actuation(self, keys: Part | None = None) -> Actuation:

@@ -101,7 +101,7 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         real="double",
         states=plant.state.size,
         measurements=plant.measurement.size,
-        memory=scheme.law.memory.size,
+        memory=scheme.flown.memory.size,
         efforts=scheme.actuation.effort.size,
         actuators=plant.inputs.size,
         noise=plant.noise.size,
@@ -184,7 +184,7 @@ class CompiledEngine:
             self._solve = allocator.start()
         build = partial(compilers.load, self.source, include=include, flags=flags, units=units, compiler=self.compiler)
         self._library: Callable[[], ctypes.CDLL] = pool.submit(build).result if pool else partial(_same, build())
-        self._memory = scheme.law.memory.size
+        self._memory = scheme.flown.memory.size
         self._configured = tapes.functions.get("configure")
         self._measurements = mission.truth.measurement.size
         self._seeds = np.array([mission.noise.seed], dtype=np.uint64)

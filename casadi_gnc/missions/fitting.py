@@ -16,6 +16,7 @@ from casadi_gnc.laws import Law
 from casadi_gnc.missions import asking
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.recording import row_of
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.scheme import Metric, Scheme
@@ -32,7 +33,7 @@ def misfits(law: type[Law], measured: Layout, believed: Any, effort: Layout) -> 
     Parameters
     ----------
     law : its class.
-    measured : what the craft's sensors give.
+    measured : what the law may read: what the craft's sensors give, or its navigation.
     believed : what its flight software believes of it.
     effort : what its actuators make.
     """
@@ -57,6 +58,11 @@ def misfits(law: type[Law], measured: Layout, believed: Any, effort: Layout) -> 
     else:
         for signal, made in zip(law.effort.signals, effort.signals, strict=True):
             yield from _apart(signal, made, f"it commands {signal.name}", "made")
+
+
+def read_by(scheme: Scheme, plant: Plant) -> Layout:
+    """Return the signals that the law of a scheme may read: those of its navigation, or the measured ones."""
+    return plant.measurement if scheme.navigation is None else scheme.navigation.signals
 
 
 def _apart(own: Signal, other: Signal, what: str, how: str) -> Iterator[str]:
@@ -119,7 +125,7 @@ def refuse(mission: Mission) -> None:
                 f"scheme {scheme.name!r} has bounds for {len(actuation.lower)} actuators, and the plant is told "
                 f"{plant.inputs.size} numbers ({', '.join(plant.inputs.names)})"
             )
-        why = list(misfits(law, plant.measurement, scheme.law.belief, actuation.effort))
+        why = list(misfits(law, read_by(scheme, plant), scheme.law.belief, actuation.effort))
         if why:
             raise FlightError(
                 f"the law {law.__name__} of scheme {scheme.name!r} does not fit {craft}: {'; '.join(why)}"

@@ -30,7 +30,7 @@ def plant_rate(mission: Mission) -> ca.Function:
 
 def law_function(mission: Mission, scheme: Scheme, parameters: Sequence[ca.SX] = ()) -> ca.Function:
     """Return (t, y, m, achieved, [p]) -> (wanted, memory_rate, shown signals...)."""
-    loop, law = Loop(mission, scheme), scheme.law
+    loop, law = Loop(mission, scheme), scheme.flown
     s = loop.symbols()
     seen = loop.seen(s.y)
     told = ca.SX.sym("achieved", scheme.actuation.effort.size)

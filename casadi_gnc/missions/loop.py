@@ -1,6 +1,6 @@
 """One sample of a scheme, composed once: flights, packages, analysis and linearisation are slices of it.
 
-    measure -> accept -> command -> clip -> allocate -> judge -> advance
+    measure -> accept -> (estimate) -> command -> clip -> allocate -> judge -> advance
 
 =========  ==================================================================  ==============================
 slice      what                                                                name in the code
@@ -30,6 +30,7 @@ from casadi_gnc.laws import advance
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.missions import asking
+from casadi_gnc.missions.navigated import Navigated
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.status import StepStatus
 
@@ -51,7 +52,7 @@ class Symbols:
         self.x = plant.state.symbol("x")
         self.y = plant.measurement.symbol("y")
         self.good = plant.measurement.symbol("good")
-        self.m = scheme.law.memory.symbol("m")
+        self.m = scheme.flown.memory.symbol("m")
         self.actuators = plant.inputs.symbol("actuators")
         self.noise = plant.noise.symbol("noise")
         self.wanted, self.limited = ca.SX.sym("wanted", rows), ca.SX.sym("limited", rows)
@@ -71,7 +72,7 @@ class Loop:
 
     def __init__(self, mission: Mission, scheme: Scheme) -> None:
         self.mission, self.scheme = mission, scheme
-        self.plant, self.law, self.actuation = mission.truth, scheme.law, scheme.actuation
+        self.plant, self.law, self.actuation = mission.truth, scheme.flown, scheme.actuation
 
     def symbols(self) -> Symbols:
         """Return fresh columns of one sample."""
@@ -224,6 +225,8 @@ class Loop:
     def advanced(self, t: Any, seen: Any, memory: Any, wanted: Any, achieved: Any) -> Any:
         """Return the memory one sample later, told what was achieved."""
         self.flowing(t, seen, memory, wanted, achieved)
+        if isinstance(self.law, Navigated):
+            return self.law.advanced(t, seen, memory, wanted, achieved)
         return advance(self.law, t, seen, memory, wanted, achieved)
 
     def flowing(self, t: Any, seen: Any, memory: Any, wanted: Any, achieved: Any) -> Any:

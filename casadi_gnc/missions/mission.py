@@ -94,10 +94,7 @@ class Mission:
         if parts is not None:
             self.__dict__["parts_asked"] = parts
         hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
-        held = (
-            each if each.law.hold == hold else replace(each, law=replace(each.law, hold=hold)) for each in self.schemes
-        )
-        object.__setattr__(self, "schemes", tuple(held))
+        object.__setattr__(self, "schemes", tuple(_held(each, hold) for each in self.schemes))
         object.__setattr__(self, "funnels", tuple(self.funnels))
         fitting.refuse(self)
         probing.probe(self)
@@ -259,11 +256,23 @@ class Mission:
 
     def guests(self) -> tuple[GuestFile, ...]:
         """Return the files of the user's own code from which classes of the mission come."""
-        parts = [(each.law, each.law.belief, each.actuation, each.actuation.allocator) for each in self.schemes]
+        parts = [
+            (each.law, each.law.belief, each.actuation, each.actuation.allocator, each.navigation)
+            for each in self.schemes
+        ]
         found = guests.files_of(self.craft, self.truth, *(part for each in parts for part in each))
         named = () if self.origin is None else self.origin.guests
         # The same text is the same code, wherever another mission has it.
         return tuple({file.module: file for file in (*found, *named)}.values())
+
+
+def _held(scheme: Scheme, hold: float) -> Scheme:
+    """Return a scheme whose law and navigation have this sample period [s]."""
+    law, navigation = scheme.law, scheme.navigation
+    if law.hold == hold and (navigation is None or navigation.hold == hold):
+        return scheme
+    moved = None if navigation is None else replace(navigation, hold=hold)
+    return replace(scheme, law=replace(law, hold=hold), navigation=moved)
 
 
 def _restored(files: tuple[GuestFile, ...], content: bytes) -> Mission:
@@ -281,6 +290,7 @@ def _digest(mission: Mission) -> str:
     told += [repr(each) for each in mission.requirements]
     for scheme in mission.schemes:
         told.append(f"{scheme.name} {scheme.law!r} {scheme.actuation!r} {scheme.feedback}")
+        told += [] if scheme.navigation is None else [repr(scheme.navigation)]
     told += [f"{file.path} {file.sha256}" for file in mission.guests()]
     # Functions show where they lie in memory, which says nothing.
     return hashlib.sha256(re.sub(r" at 0x[0-9a-f]+", "", "\n".join(told)).encode()).hexdigest()

@@ -69,7 +69,7 @@ def describe(
         scheme=chosen.name,
         period=mission.timing.sample_period,
         measured=truth.measurement,
-        memory=chosen.law.memory,
+        memory=chosen.flown.memory,
         wanted=actuation.named("wanted"),
         limited=actuation.named("limited"),
         actuators=truth.inputs,

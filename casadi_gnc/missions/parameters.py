@@ -182,11 +182,12 @@ def _with(mission: Mission, values: dict[str, Any]) -> Mission:
     parts = Parts(craft)
     schemes = []
     for each in mission.schemes:
-        law, actuation = laws[each.name], each.actuation
+        law, actuation, navigation = laws[each.name], each.actuation, each.navigation
         if craft is not mission.craft and each.keys is not None:  # made by the craft, so made again
             actuation = _actuation(each.keys, parts)
             law = law if law.belief_kind() is None else replace(law, body=parts.belief)
-        schemes.append(replace(each, law=law, actuation=actuation))
+            navigation = parts.navigation
+        schemes.append(replace(each, law=law, actuation=actuation, navigation=navigation))
     return replace(mission, craft=craft, schemes=schemes, parts=parts)
 
 

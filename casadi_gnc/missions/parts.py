@@ -15,6 +15,7 @@ from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.asking import ask, column
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.plant import Plant
+from casadi_gnc.navigation import Navigation
 from casadi_gnc.signals import Layout
 from casadi_gnc.tables.part import MisfitError, plain
 
@@ -46,6 +47,27 @@ class Parts:
     def belief(self) -> Any:
         """What the flight software believes."""
         return ask(self.craft, "belief")
+
+    @cached_property
+    def navigation(self) -> Navigation | None:
+        """What laws read, where that is not the measurement; what is no navigation is a `FlightError`."""
+        found = ask(self.craft, "navigation")
+        if found is None:
+            return None
+        if not isinstance(found, Navigation):
+            told = f"{self._name}.navigation returned a {type(found).__name__}"
+            raise FlightError(f"{told}, expected a casadi_gnc.navigation.Navigation or None")
+        measured, read = self.plant.measurement, found.inputs.signals
+        absent = [one.name for one in read if one.name not in measured or measured.signal(one.name).size != one.size]
+        if absent:
+            told = f"{self._name}.navigation reads {', '.join(absent)}"
+            raise FlightError(f"{told}, and the sensors give {', '.join(measured.names)}")
+        return found
+
+    @property
+    def readable(self) -> Layout:
+        """The signals that a law may read."""
+        return self.plant.measurement if self.navigation is None else self.navigation.signals
 
     @cached_property
     def start(self) -> Mapping[str, Sequence[float]]:

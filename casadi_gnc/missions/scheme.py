@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.navigated import Navigated
+from casadi_gnc.navigation import Navigation
 from casadi_gnc.tables.part import NAME, Part
 
 Feedback = Literal["achieved", "wanted"]
@@ -27,6 +30,7 @@ class Scheme:
     feedback : what observers and anti-windup are told was done: "achieved" by the actuators, or "wanted".
     title : for whoever reads the results.
     keys : the keys that `Craft.actuation` was given, if it was.
+    navigation : what the law reads, where that is not the measurement; `Craft.navigation` makes one.
     """
 
     name: str
@@ -35,12 +39,20 @@ class Scheme:
     feedback: Feedback = "achieved"
     title: str = ""
     keys: Part | None = None
+    navigation: Navigation | None = None
 
     def __post_init__(self) -> None:
         if not re.fullmatch(NAME, str(self.name)):
             raise FlightError(f"a scheme is named {self.name!r}, expected letters, digits and _, the first a letter")
         if self.feedback not in ("achieved", "wanted"):
             raise FlightError(f"feedback is {self.feedback!r}, expected 'achieved' or 'wanted'")
+
+    @cached_property
+    def flown(self) -> Law:
+        """The law as it flies: behind its navigation where it has one."""
+        if self.navigation is None:
+            return self.law
+        return Navigated(hold=self.law.hold, printed=self.law.printed, law=self.law, navigation=self.navigation)
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,7 +43,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     complaints = Complaints(document)
     parts = Parts(craft)
     with complaints.about("spacecraft", "model"):
-        _ = parts.measured, parts.belief
+        _ = parts.measured, parts.belief, parts.navigation
     complaints.settle()
     for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
         complaints.add(misfit.path, str(misfit))
@@ -188,7 +188,7 @@ def _scheme(
         raise
     except Exception as error:
         raise _about_law(error, law) from error
-    return Scheme(table.name, made, actuation, table.feedback, table.title, keys)
+    return Scheme(table.name, made, actuation, table.feedback, table.title, keys, parts.navigation)
 
 
 def _keys_of(table: Any, craft: Craft) -> Part:
@@ -199,7 +199,7 @@ def _keys_of(table: Any, craft: Craft) -> Part:
 
 def _misfit(table: Any, law: type[Law], parts: Parts, actuation: Actuation) -> str:
     """Return why a scheme's law cannot fly the craft whatever its gains, "" where it can."""
-    why = list(fitting.misfits(law, parts.plant.measurement, parts.belief, actuation.effort))
+    why = list(fitting.misfits(law, parts.readable, parts.belief, actuation.effort))
     told = f"the law {table.law['type']!r} does not fit {type(parts.craft).__name__}: {'; '.join(why)}"
     return f"{told}; `casadi-gnc laws` says which fits what" if why else ""
 

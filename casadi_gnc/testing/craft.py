@@ -54,7 +54,9 @@ def check_mission(mission: Mission) -> None:
     for scheme in mission.schemes:
         check_law(mission, scheme.name)
         why = list(
-            fitting.misfits(type(scheme.law), mission.truth.measurement, scheme.law.belief, scheme.actuation.effort)
+            fitting.misfits(
+                type(scheme.law), fitting.read_by(scheme, mission.truth), scheme.law.belief, scheme.actuation.effort
+            )
         )
         must(not why, f"the law of {scheme.name} does not fit: {'; '.join(why)}")
         _check_words(mission.with_scheme(scheme.name))

@@ -10,6 +10,7 @@ import numpy as np
 from casadi_gnc.laws import Law, advance, gains_of
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.navigated import Navigated
 from casadi_gnc.missions.recording import observed
 from casadi_gnc.testing.asserting import must, numbers
 
@@ -31,10 +32,14 @@ def check_law(mission: Mission, scheme: str | None = None) -> None:
     """
     chosen = mission.scheme(scheme)
     loop, law = Loop(mission, chosen), chosen.law
-    y = ca.DM(loop.seen(mission.first_measurement()))
+    measured = ca.DM(loop.seen(mission.first_measurement()))
+    y = measured
+    if isinstance(loop.law, Navigated):
+        y = ca.DM(loop.law.read(0.0, measured, loop.started(0.0, mission.first_measurement())))
     _check_declarations(type(law))
-    for hold in (0.0, mission.timing.sample_period):
-        _check_sizes(loop, replace(law, hold=hold), y)
+    held = mission.timing.sample_period
+    for hold in (held,) if chosen.navigation is not None and chosen.navigation.memory.size else (0.0, held):
+        _check_sizes(loop, replace(law, hold=hold), measured)
     _check_short_hold(replace(law, hold=_SHORT), y)
     _check_gradients(law, y)
     for each in law.checks():
@@ -57,7 +62,7 @@ def _check_declarations(law: type[Law]) -> None:
 def _check_sizes(loop: Loop, law: Law, y: ca.DM) -> None:
     """Compose every slice that has the law in it: sizes are looked at there."""
     held = Loop(loop.mission, replace(loop.scheme, law=law))
-    m = numbers(held.started(0.0, loop.mission.first_measurement())) if law.memory.size else np.zeros(0)
+    m = numbers(held.started(0.0, loop.mission.first_measurement())) if held.law.memory.size else np.zeros(0)
     must(np.isfinite(m).all(), f"{type(law).__name__}.start is not finite at the mission's start")
     memory, wanted = held.commanded(0.0, y, ca.DM(m))
     must(np.isfinite(numbers(wanted)).all(), f"{type(law).__name__}.command is not finite at the mission's start")

@@ -23,6 +23,7 @@ FLOORS = {
     "system": 1,
     "mechanics": 2,
     "laws": 3,
+    "navigation": 3,
     "allocation": 3,
     "synthesis": 3,
     "embedded": 4,
