@@ -129,9 +129,26 @@ class Gyrostat(RigidBody):
 
     wheels: WheelArray = field(kw_only=True)
 
+    def stored(self, rate: Any, speed: Any) -> Any:
+        """Return h, (3,), [N m s], so that J w + h is the whole momentum."""
+        return self.wheels.momentum(speed)
+
     def coupling(self, rate: Any, speed: Any) -> Any:
         """Return -w x h, (3,), [N m]: what the stored momentum does to a turning body."""
-        return -ca.cross(rate, self.wheels.momentum(speed))
+        return -ca.cross(rate, self.stored(rate, speed))
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueGyrostat(Gyrostat):
+    """Model a rigid body whose wheels are told the torques of their motors.
+
+    A motor turns its wheel against the body, J_s (Omega' + g.w') = u, so the body turns as if the wheels' inertia
+    about their axes were none of its own: `inertia` is J - sum J_s g g', and a wheel stores J_s (Omega + g.w).
+    """
+
+    def stored(self, rate: Any, speed: Any) -> Any:
+        """Return h = sum g J_s (Omega + g.w), (3,), [N m s]."""
+        return self.wheels.momentum(speed + ca.mtimes(self.wheels.axes.T, rate))
 
 
 def attitude_signals(body: RigidBody) -> Layout:

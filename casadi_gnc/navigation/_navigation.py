@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 
@@ -30,13 +30,13 @@ class Navigation:
     hold: float = dataclasses.field(default=0.0, kw_only=True)
 
     #: Measured signals that it reads, by the plant's names.
-    inputs: Any = Layout()
+    inputs: ClassVar[Any] = Layout()
     #: What laws may read. Must be given.
-    signals: Any = Layout()
+    signals: ClassVar[Any] = Layout()
     #: What it carries from one sample to the next; it moves in `jump`.
-    memory: Any = Layout()
+    memory: ClassVar[Any] = Layout()
     #: What it shows besides, for records and plots.
-    outputs: Any = Layout()
+    outputs: ClassVar[Any] = Layout()
 
     def start(self, t: Any, y: Any) -> Any:
         """Return the memory at the first measurement y."""
@@ -59,9 +59,8 @@ class Navigation:
         return {}
 
 
-@dataclass(frozen=True, eq=False)
 class Estimator:
-    """Base of what estimates attitude and rate from sensors; a frozen dataclass of its own numbers."""
+    """Base of what estimates attitude and rate from sensors; a subclass is a frozen dataclass of its numbers."""
 
     #: Measured signals that it reads.
     inputs: Any = Layout()
@@ -107,7 +106,6 @@ class Wanted:
     acceleration: Any = dataclasses.field(default_factory=lambda: ca.DM.zeros(3))
 
 
-@dataclass(frozen=True, eq=False)
 class Reference:
     """Base of what says where a craft should point; the default is to stay with the inertial frame."""
 

@@ -52,24 +52,24 @@ class AttitudeNavigation(Navigation):
     passed: Layout = field(default_factory=Layout)
 
     @property
-    def inputs(self) -> Layout:
+    def inputs(self) -> Layout:  # type: ignore[override]
         """What the estimator, the reference and laws read of the measurement."""
         first = _ATTITUDE if self.estimator is None else self.estimator.inputs
         signals = (*first.signals, *self.reference.reads.signals, *self.passed.signals)
         return Layout(tuple({signal.name: signal for signal in signals}.values()))
 
     @property
-    def signals(self) -> Layout:
+    def signals(self) -> Layout:  # type: ignore[override]
         """Attitude and rates, and what is passed on."""
         return Layout(_SEEN) + Layout(tuple(one for one in self.passed.signals if one.name not in ("mrp", "rate")))
 
     @property
-    def memory(self) -> Layout:
+    def memory(self) -> Layout:  # type: ignore[override]
         """The estimator's."""
         return Layout() if self.estimator is None else self.estimator.memory
 
     @property
-    def outputs(self) -> Layout:
+    def outputs(self) -> Layout:  # type: ignore[override]
         """The estimator's."""
         return Layout() if self.estimator is None else self.estimator.outputs
 
