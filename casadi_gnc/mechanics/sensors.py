@@ -1,0 +1,317 @@
+"""Sensors of a satellite: what each tells of the truth, how often, and how wrong.
+
+A sensor names what it adds to the columns of a plant: signals that are measured, states that walk, standard normal
+numbers that are drawn for every sample and held over it. Its methods are pure functions of them.
+
+==========  ================================================================================
+symbol      meaning
+==========  ================================================================================
+q, w        true attitude of the body from inertial, (4,), and its rate, (3,), [rad/s]
+h           base period of the flight, [s]: random walks grow by their density times sqrt(h)
+n           standard normal numbers, fresh at every sample
+==========  ================================================================================
+
+What is measured at sample k is true at that sample: there is no delay. A sensor with a longer `period` speaks at whole
+multiples of it; with that, or with drop-outs or a limited view, it has a signal NAME_valid that is 1 where its
+value may be used, and 0 where it may not.
+
+Gyro: Farrenkopf (1978), doi:10.2514/3.55779, with the noise of a sample arw/sqrt(h) and the bias's walk rrw sqrt(h).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics import bounds, exact, normal
+from casadi_gnc.mechanics import quaternions
+from casadi_gnc.signals import Layout, Signal
+
+_NONE = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensor:
+    """Base of all sensors.
+
+    Parameters
+    ----------
+    name : prefix of its signals.
+    hold : base period of the flight, [s].
+    period : between two of its values, [s], a whole multiple of `hold`; 0: `hold`.
+    dropout : chance that a value which is due does not come, 0 to below 1.
+    """
+
+    name: str
+    hold: float = field(kw_only=True)
+    period: float = field(default=0.0, kw_only=True)
+    dropout: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not self.hold > 0:
+            raise FlightError(
+                f"{self.name}: the base period is {self.hold:g} s, expected more than 0; sensors are sampled"
+            )
+        if self.period and abs(self.period / self.hold - self.every) > 1e-9 * self.every:
+            raise FlightError(
+                f"{self.name}: a value every {self.period:g} s, expected a whole multiple of the sample period "
+                f"{self.hold:g} s, at least once"
+            )
+        if not 0 <= self.dropout < 1:
+            raise FlightError(f"{self.name}: the chance of a drop-out is {self.dropout:g}, expected 0 to below 1")
+
+    @property
+    def every(self) -> int:
+        """Samples of the flight from value to value."""
+        return max(1, round(self.period / self.hold))
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether there is a signal NAME_valid."""
+        return self.every > 1 or self.dropout > 0
+
+    @property
+    def value(self) -> Signal:
+        """The signal that is measured."""
+        raise TypeError(f"{type(self).__name__} defines no value")
+
+    @property
+    def measured(self) -> Layout:
+        """What is added to the measurement."""
+        valid = (Signal(f"{self.name}_valid", 1, "", limit=1.0),) if self.is_partial else ()
+        return Layout((self.value, *valid))
+
+    @property
+    def state(self) -> Layout:
+        """What is added to the plant's state."""
+        return Layout()
+
+    @property
+    def noise(self) -> Layout:
+        """Standard normal numbers."""
+        lost = (Signal(f"{self.name}_dropout"),) if self.dropout > 0 else ()
+        return Layout((Signal(f"{self.name}_noise", self.value.size if self.value.size != 4 else 3), *lost))
+
+    def start(self) -> dict[str, Any]:
+        """Return the states at t = 0, by signal."""
+        return {}
+
+    def rate(self, t: Any, own: Any, drawn: Any) -> dict[str, Any]:
+        """Return d(state)/dt by signal; `own` has the states by name, `drawn` the normal numbers."""
+        return {}
+
+    def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
+        """Return the value, and 1 where the truth lets it be seen, for normal numbers `noise`."""
+        raise TypeError(f"{type(self).__name__} defines no read")
+
+    def measure(self, t: Any, truth: Any, own: Any, drawn: Any) -> dict[str, Any]:
+        """Return what is measured, by signal.
+
+        Parameters
+        ----------
+        truth : by name: quaternion, rate, and what the sensor looks at of wheel_speed, magnetic_field (body, [T]),
+            sun (unit vector, body) and sunlight (0 to 1).
+        """
+        value, seen = self.read(truth, own, getattr(drawn, f"{self.name}_noise"))
+        found = {self.value.name: value}
+        if self.is_partial:
+            flags = [ca.SX(seen), self._due(t)]
+            if self.dropout > 0:
+                # A standard normal number is above the quantile of 1 - p with the chance p.
+                least = float(normal.quantile(np.array(1 - self.dropout)))
+                flags.append(getattr(drawn, f"{self.name}_dropout") < least)
+            found[f"{self.name}_valid"] = ca.if_else(bounds.all_of(ca.vertcat(*flags)), 1.0, 0.0)
+        return found
+
+    def _due(self, t: Any) -> Any:
+        """Return whether a value is due at a sample's time; a whole number is made of it first, for rounding."""
+        sample = ca.floor(t / self.hold + 0.5)
+        return ca.fabs(sample - self.every * ca.floor((sample + 0.5) / self.every)) < 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Gyro(Sensor):
+    """Measure the rate, (3,), [rad/s], body axes: M w + bias + noise.
+
+    Parameters
+    ----------
+    angle_random_walk : arw, [rad/sqrt(s)]: white noise of the rate.
+    bias_random_walk : rrw, [rad/s/sqrt(s)]: how the bias wanders.
+    bias : at t = 0, (3,), [rad/s].
+    scale : error of each axis' factor, (3,), [-].
+    misalignment : small turn of the triad from the body, (3,), [rad]; M = (I + diag(scale)) (I - [misalignment]x).
+    range : largest rate of an axis that it can tell, [rad/s].
+    """
+
+    angle_random_walk: float = 0.0
+    bias_random_walk: float = 0.0
+    bias: tuple[float, ...] = _NONE
+    scale: tuple[float, ...] = _NONE
+    misalignment: tuple[float, ...] = _NONE
+    range: float = 10.0
+
+    @property
+    def value(self) -> Signal:
+        """The rate."""
+        return Signal(self.name, 3, "rad/s", "body", self.range)
+
+    @property
+    def state(self) -> Layout:
+        """The bias."""
+        return Layout((Signal(f"{self.name}_bias", 3, "rad/s", "body"),))
+
+    @property
+    def noise(self) -> Layout:
+        """White noise, and the bias's walk."""
+        return super().noise + Layout((Signal(f"{self.name}_walk", 3),))
+
+    def start(self) -> dict[str, Any]:
+        """Return the bias."""
+        return {f"{self.name}_bias": list(self.bias)}
+
+    def rate(self, t: Any, own: Any, drawn: Any) -> dict[str, Any]:
+        """Return the bias's walk: held over a sample, it moves the bias by rrw sqrt(h) n."""
+        density = self.bias_random_walk / exact.sqrt(self.hold)
+        return {f"{self.name}_bias": density * getattr(drawn, f"{self.name}_walk")}
+
+    def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
+        """Return M w + bias + arw/sqrt(h) n."""
+        turned = truth.rate - ca.cross(exact.array(self.misalignment), truth.rate)
+        distorted = turned + exact.array(self.scale) * turned
+        density = self.angle_random_walk / exact.sqrt(self.hold)
+        return distorted + getattr(own, f"{self.name}_bias") + density * noise, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class StarTracker(Sensor):
+    """Measure the attitude of the body from inertial, a quaternion, (4,), scalar first and not negative.
+
+    Parameters
+    ----------
+    mounting : quaternion of the tracker's frame from the body, (4,); its z axis is the boresight.
+    across, about : standard deviations of the turn across and about the boresight, [rad].
+    max_rate : rate of the body, [rad/s], beyond which it finds no attitude.
+    """
+
+    mounting: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
+    across: float = 0.0
+    about: float = 0.0
+    max_rate: float = math.inf
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether there is a signal NAME_valid."""
+        return super().is_partial or self.max_rate < math.inf
+
+    @property
+    def value(self) -> Signal:
+        """The quaternion."""
+        return Signal(self.name, 4, "-", limit=1.01)
+
+    @property
+    def deviations(self) -> tuple[float, float, float]:
+        """Standard deviations of the turns about the tracker's axes, [rad]."""
+        return self.across, self.across, self.about
+
+    def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
+        """Return the attitude, turned by the noise in the tracker's frame."""
+        mounting = exact.array(self.mounting)
+        wrong = quaternions.from_rotation_vector(exact.array(self.deviations) * noise)
+        tracker = quaternions.compose(wrong, quaternions.compose(mounting, truth.quaternion))
+        body = quaternions.compose(quaternions.conjugate(mounting), tracker)
+        slow = ca.sumsqr(truth.rate) <= self.max_rate**2 if self.max_rate < math.inf else 1.0
+        return quaternions.short_way(body), slow
+
+
+@dataclass(frozen=True, eq=False)
+class Magnetometer(Sensor):
+    """Measure the magnetic field, (3,), [T], body axes, with a bias and noise.
+
+    Parameters
+    ----------
+    deviation : of each axis, [T].
+    bias : what is left after calibration, (3,), [T].
+    """
+
+    deviation: float = 0.0
+    bias: tuple[float, ...] = _NONE
+
+    @property
+    def value(self) -> Signal:
+        """The field."""
+        return Signal(self.name, 3, "T", "body", 1e-3)
+
+    def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
+        """Return the field."""
+        return truth.magnetic_field + exact.array(self.bias) + self.deviation * noise, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class SunSensor(Sensor):
+    """Measure the direction of the sun, a unit vector, (3,), body axes, while it is lit and in view.
+
+    Parameters
+    ----------
+    deviation : of the direction across each axis, [rad].
+    axis : middle of the view, unit vector, (3,), body axes.
+    view : half angle of the cone that is seen, [rad]; pi: all around, as several sensors together see.
+    """
+
+    deviation: float = 0.0
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+    view: float = math.pi
+
+    @property
+    def is_partial(self) -> bool:
+        """Whether there is a signal NAME_valid: there are nights."""
+        return True
+
+    @property
+    def value(self) -> Signal:
+        """The direction."""
+        return Signal(self.name, 3, "-", "body", 1.01)
+
+    def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
+        """Return the direction."""
+        found = truth.sun + self.deviation * noise
+        lit = truth.sunlight > 0.5
+        inside = ca.dot(exact.array(self.axis), truth.sun) >= exact.cos_sin(self.view)[0]
+        return found / ca.sqrt(ca.sumsqr(found)), ca.logic_and(lit, inside)
+
+
+@dataclass(frozen=True, eq=False)
+class Tachometers(Sensor):
+    """Measure the speeds of the wheels, (N,), [rad/s].
+
+    Parameters
+    ----------
+    count : N.
+    deviation : of each, [rad/s].
+    quantum : least difference that is told, [rad/s]; 0: none.
+    max_speed : beyond which no value is true, [rad/s].
+    """
+
+    count: int = field(kw_only=True)
+    deviation: float = 0.0
+    quantum: float = 0.0
+    max_speed: float = 1e5
+
+    @property
+    def value(self) -> Signal:
+        """The speeds."""
+        return Signal(self.name, self.count, "rad/s", "", self.max_speed, kind="wheel_speed")
+
+    @property
+    def noise(self) -> Layout:
+        """White noise of each."""
+        return Layout((Signal(f"{self.name}_noise", self.count), *super().noise.signals[1:]))
+
+    def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
+        """Return the speeds, rounded to the quantum."""
+        speed = truth.wheel_speed + self.deviation * noise
+        return (self.quantum * ca.floor(speed / self.quantum + 0.5) if self.quantum else speed), 1.0
