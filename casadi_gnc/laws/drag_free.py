@@ -45,7 +45,9 @@ _POSITION = memory_layout("position_", 1, "m/s", "kg", "N")
 
 @dataclass(frozen=True, eq=False)
 class DragFree(Law):
-    """Track the test mass; `body` is what the software believes of the satellite."""
+    """Keep a satellite around its free test mass, inside funnels, with mass and inertia adapted.
+
+    `body` is what the software believes of the satellite."""
 
     body: Satellite
     attitude_funnel: PerformanceFunnel

@@ -44,7 +44,9 @@ def signed_power(value: Any, exponent: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class FiniteTimeFaultTolerant(Law):
-    """Turn the MRPs to zero by a terminal sliding mode; `body` is what the software believes of the craft."""
+    """Turn the MRPs to zero in finite time by a terminal sliding mode that bears actuator faults.
+
+    `body` is what the software believes of the craft."""
 
     body: RigidBody
     surface_gain: Any = gain("1/s", "slope of the surface", symbol="Gamma", above=0.0)

@@ -52,7 +52,9 @@ from casadi_gnc.status import StepStatus
 
 @dataclass(frozen=True, eq=False)
 class IntermediateObserver(Law):
-    """Bring the pair to its port; `body` is what the software believes of it."""
+    """Bring a docking pair to its port by state feedback and an intermediate observer of disturbance and state.
+
+    `body` is what the software believes of the pair."""
 
     body: PairModel
     controller_gain: Any = gain("N/m, N s/m", "force per position and velocity", symbol="K", size=(3, 6))

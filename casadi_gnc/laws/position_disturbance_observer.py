@@ -43,7 +43,9 @@ from casadi_gnc.status import StepStatus
 
 @dataclass(frozen=True, eq=False)
 class PositionDisturbanceObserver(Law):
-    """Bring the pair to its port; `body` is what the software believes of it."""
+    """Bring a docking pair to its port by state feedback and a disturbance observer on the measured velocity.
+
+    `body` is what the software believes of the pair."""
 
     body: PairModel
     controller_gain: Any = gain("N/m, N s/m", "force per position and velocity", symbol="K", size=(3, 6))

@@ -60,7 +60,9 @@ from casadi_gnc.status import StepStatus
 
 @dataclass(frozen=True, eq=False)
 class PrescribedPerformance(Law):
-    """Keep the attitude inside `funnel`; `body` is what the software believes of the craft."""
+    """Keep the attitude inside a funnel that narrows as the mission prescribes.
+
+    `body` is what the software believes of the craft."""
 
     body: RigidBody
     funnel: PerformanceFunnel

@@ -63,7 +63,9 @@ from casadi_gnc.signals import Layout, Signal
 
 @dataclass(frozen=True, eq=False)
 class TwoObserverAttitude(Law):
-    """Turn the MRPs to zero; `body` is what the software believes of the craft, perhaps with wheels."""
+    """Turn the MRPs to zero with two disturbance observers, of the attitude and of the rate.
+
+    `body` is what the software believes of the craft, perhaps with wheels."""
 
     body: RigidBody
     attitude_gain: Any = gain("1/s", "convergence of the attitude", symbol="k1", above=0.0)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from casadi_gnc.errors import GncError
 from casadi_gnc.laws import REGISTRY as LAWS
@@ -17,7 +17,7 @@ from casadi_gnc.missions.craft import Craft
 from casadi_gnc.problem_files.document import Document, read_kind
 from casadi_gnc.problem_files.loading import craft_of, load
 from casadi_gnc.signals import Layout
-from casadi_gnc.tables.part import own_tables
+from casadi_gnc.tables.part import Part, own_tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,16 @@ def keys(craft: type[Craft]) -> Iterator[dict[str, Any]]:
 
 
 def _key(where: str, name: str, field: Any) -> dict[str, Any]:
-    return {"table": where, "name": name, "required": field.is_required(), "meaning": field.description or ""}
+    meaning = field.description or _about(field.annotation)
+    return {"table": where, "name": name, "required": field.is_required(), "meaning": meaning}
+
+
+def _about(annotation: Any) -> str:
+    """Return the first sentence about the table that a key holds, nothing where it holds numbers."""
+    for kind in (annotation, *get_args(annotation)):
+        if isinstance(kind, type) and issubclass(kind, Part):
+            return " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
+    return ""
 
 
 def law_data(law: Named, samples: dict[str, Sample | None]) -> dict[str, Any]:

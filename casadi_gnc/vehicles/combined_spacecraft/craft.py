@@ -52,7 +52,7 @@ class _View:
 
 
 class CombinedSpacecraftCraft(Craft, Orientation):
-    """The craft as known: inertia, frames, engine and thrusters."""
+    """A chaser with its captured target on thrusters, as known: inertia, frames, engine, thrusters."""
 
     scheme_keys: ClassVar[type[Part]] = SchemeKeys
     example: ClassVar[str | None] = "huang2020/detumble"

@@ -47,7 +47,7 @@ _EARTH = 3e14
 
 
 class DockingPairCraft(Craft):
-    """Both craft."""
+    """Two craft that dock by their coils: masses, actuator, port."""
 
     scheme_keys: ClassVar[type[Part]] = SchemeKeys
     example: ClassVar[str | None] = "shi2020/docking"

@@ -46,7 +46,7 @@ _NOWHERE = [0.0, 0.0, 0.0]
 
 
 class WheelSpacecraftCraft(Craft, Orientation):
-    """The craft as known, which is what the laws believe; its orientation turns the wheels' axes."""
+    """A craft on reaction wheels as known, which is what the laws believe; its orientation turns the wheels' axes."""
 
     scheme_keys: ClassVar[type[Part]] = SchemeKeys
     example: ClassVar[str | None] = "huang2019/nominal"

@@ -1,0 +1,28 @@
+"""The pages made from the code hold what the code has."""
+
+import sys
+
+from running_pages import ROOT
+
+from casadi_gnc.laws import REGISTRY as LAWS
+from casadi_gnc.missions.craft import REGISTRY as CRAFTS
+from casadi_gnc.status import StepStatus
+
+
+def test_pages_hold_every_law_craft_and_status(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    import catalogue_pages
+
+    catalogue_pages.write(tmp_path / "catalogue")
+    pages = {page.stem: page.read_text(encoding="utf-8") for page in (tmp_path / "catalogue").iterdir()}
+    assert set(pages) == {"laws", "crafts", "statuses", "names"}
+    headings = {name: [line[3:] for line in text.splitlines() if line.startswith("## ")] for name, text in pages.items()}
+    assert headings["laws"] == LAWS.names()
+    assert headings["crafts"] == CRAFTS.names()
+    for bit in StepStatus:
+        assert f"| `{bit.name}` | {bit.value} | {bit.sentences[0]} |" in pages["statuses"]
+    assert "`rate_gain` | k2 | N m s/rad | > 0 |" in pages["laws"]
+    stamps = {page: page.stat().st_mtime_ns for page in (tmp_path / "catalogue").iterdir()}
+    catalogue_pages.write(tmp_path / "catalogue")
+    assert stamps == {page: page.stat().st_mtime_ns for page in (tmp_path / "catalogue").iterdir()}
+    sys.modules.pop("catalogue_pages")

@@ -1,0 +1,12 @@
+"""docs/start.md, every block as it stands there."""
+
+import pytest
+from running_pages import run, sections
+
+PAGE = "start.md"
+
+
+@pytest.mark.slow  # first_law is the page that the fast tests run
+@pytest.mark.parametrize("section", [section.title for section in sections(PAGE)])
+def test_section(section, tmp_path):
+    run(PAGE, section, tmp_path)
