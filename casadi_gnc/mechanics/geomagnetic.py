@@ -4,13 +4,13 @@
 symbol      meaning
 ==========  ==========================================================================
 r           position from the Earth's centre, Earth-fixed, (3,), [m]
-u           r/|r|, its direction cosines x, y, z
+u           r/norm(r), its direction cosines x, y, z
 a           reference radius, 6371.2 km
 g, h        Schmidt semi-normalised coefficients of degree n and order m, [nT]
 H(n, m)     Schmidt's function of z, divided by (x^2 + y^2)^(m/2)
 ==========  ==========================================================================
 
-    V = a sum_n (a/|r|)^(n+1) sum_m H(n, m)(z) (g c_m + h s_m),      c_m + i s_m = (x + i y)^m,      B = -grad V
+    V = a sum_n (a/norm(r))^(n+1) sum_m H(n, m)(z) (g c_m + h s_m),      c_m + i s_m = (x + i y)^m,      B = -grad V
 
 Written by direction cosines (Pines 1973, doi:10.2514/3.50619) nothing is singular at the poles. The recursion of H and
 its slope are those of Schmidt's functions,

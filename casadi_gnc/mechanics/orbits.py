@@ -10,12 +10,12 @@ a, e        semi-major axis [m], eccentricity
 dE          eccentric anomaly passed since the epoch, [rad]
 ==========  ==========================================================================
 
-    r'' = -mu r/|r|^3 + J2 term                            `gravity`
+    r'' = -mu r/norm(r)^3 + J2 term                            `gravity`
 
 Closed form, two bodies (Battin, An Introduction to the Mathematics and Methods of Astrodynamics (1999), section
 4.3, doi:10.2514/4.861543): with sigma = r0'v0/sqrt(mu), Kepler's equation between two places of one orbit is
 
-    n t = dE + sigma/sqrt(a) (1 - cos dE) - (1 - |r0|/a) sin dE,
+    n t = dE + sigma/sqrt(a) (1 - cos dE) - (1 - norm(r0)/a) sin dE,
 
 and r, v follow from r0, v0 by Lagrange's coefficients. Secular drift by J2 turns that orbit's plane and apsides at
 their mean rates (Vallado, Fundamentals of Astrodynamics and Applications, section 9.6).
