@@ -17,7 +17,8 @@ from casadi_gnc.signals import Layout, Signal
 class AttitudePD(Law):
     """Turn the MRPs to zero by proportional and derivative control.
 
-    `body` is not needed and accepted so that all laws are built alike."""
+    `body` is not needed and accepted so that all laws are built alike.
+    """
 
     body: RigidBody
     attitude_gain: Any = gain("N m", "torque per MRP", symbol="k_sigma", above=0.0)

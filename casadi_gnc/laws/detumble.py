@@ -46,7 +46,8 @@ from casadi_gnc.signals import Layout, Signal
 class Detumble(Law):
     """Bring the rate to zero against a disturbance that an observer estimates, without wind-up at the limits.
 
-    `body` is what the software believes of the craft."""
+    `body` is what the software believes of the craft.
+    """
 
     body: RigidBody
     rate_gain: Any = gain("1/s", "damping of the rate", symbol="k2", above=0.0)

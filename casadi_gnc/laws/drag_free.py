@@ -47,7 +47,8 @@ _POSITION = memory_layout("position_", 1, "m/s", "kg", "N")
 class DragFree(Law):
     """Keep a satellite around its free test mass, inside funnels, with mass and inertia adapted.
 
-    `body` is what the software believes of the satellite."""
+    `body` is what the software believes of the satellite.
+    """
 
     body: Satellite
     attitude_funnel: PerformanceFunnel

@@ -46,7 +46,8 @@ def signed_power(value: Any, exponent: Any) -> Any:
 class FiniteTimeFaultTolerant(Law):
     """Turn the MRPs to zero in finite time by a terminal sliding mode that bears actuator faults.
 
-    `body` is what the software believes of the craft."""
+    `body` is what the software believes of the craft.
+    """
 
     body: RigidBody
     surface_gain: Any = gain("1/s", "slope of the surface", symbol="Gamma", above=0.0)

@@ -54,7 +54,8 @@ from casadi_gnc.status import StepStatus
 class IntermediateObserver(Law):
     """Bring a docking pair to its port by state feedback and an intermediate observer of disturbance and state.
 
-    `body` is what the software believes of the pair."""
+    `body` is what the software believes of the pair.
+    """
 
     body: PairModel
     controller_gain: Any = gain("N/m, N s/m", "force per position and velocity", symbol="K", size=(3, 6))

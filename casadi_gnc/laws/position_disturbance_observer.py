@@ -45,7 +45,8 @@ from casadi_gnc.status import StepStatus
 class PositionDisturbanceObserver(Law):
     """Bring a docking pair to its port by state feedback and a disturbance observer on the measured velocity.
 
-    `body` is what the software believes of the pair."""
+    `body` is what the software believes of the pair.
+    """
 
     body: PairModel
     controller_gain: Any = gain("N/m, N s/m", "force per position and velocity", symbol="K", size=(3, 6))

@@ -62,7 +62,8 @@ from casadi_gnc.status import StepStatus
 class PrescribedPerformance(Law):
     """Keep the attitude inside a funnel that narrows as the mission prescribes.
 
-    `body` is what the software believes of the craft."""
+    `body` is what the software believes of the craft.
+    """
 
     body: RigidBody
     funnel: PerformanceFunnel

@@ -60,7 +60,8 @@ _FULL_TURN = 1e-6
 class ProximityTracking(Law):
     """Hold a point of a tumbling target: position and attitude error to zero, six degrees of freedom.
 
-    `body` is what the software believes of the motion."""
+    `body` is what the software believes of the motion.
+    """
 
     body: ProximityMotion
     position_slope: Any = gain("1/s", "closing speed per position error", symbol="Lambda_1", above=0.0)

@@ -18,7 +18,8 @@ from casadi_gnc.signals import Layout, Signal
 class RateDamping(Law):
     """Damp the rate: a torque against it.
 
-    `body` is not needed and accepted so that all laws are built alike."""
+    `body` is not needed and accepted so that all laws are built alike.
+    """
 
     body: RigidBody
     rate_gain: Any = gain("N m s/rad", "torque per rate", symbol="k2", above=0.0)

@@ -65,7 +65,8 @@ from casadi_gnc.signals import Layout, Signal
 class TwoObserverAttitude(Law):
     """Turn the MRPs to zero with two disturbance observers, of the attitude and of the rate.
 
-    `body` is what the software believes of the craft, perhaps with wheels."""
+    `body` is what the software believes of the craft, perhaps with wheels.
+    """
 
     body: RigidBody
     attitude_gain: Any = gain("1/s", "convergence of the attitude", symbol="k1", above=0.0)

@@ -16,7 +16,9 @@ def test_pages_hold_every_law_craft_and_status(tmp_path, monkeypatch):
     catalogue_pages.write(tmp_path / "catalogue")
     pages = {page.stem: page.read_text(encoding="utf-8") for page in (tmp_path / "catalogue").iterdir()}
     assert set(pages) == {"laws", "crafts", "statuses", "names"}
-    headings = {name: [line[3:] for line in text.splitlines() if line.startswith("## ")] for name, text in pages.items()}
+    headings = {
+        name: [line[3:] for line in text.splitlines() if line.startswith("## ")] for name, text in pages.items()
+    }
     assert headings["laws"] == LAWS.names()
     assert headings["crafts"] == CRAFTS.names()
     for bit in StepStatus:

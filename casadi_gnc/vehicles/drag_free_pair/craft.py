@@ -35,7 +35,7 @@ _KEYS = {"mrp": "mrp", "rate": "rate_rad_per_s", "position": "position_m", "velo
 
 
 class DragFreePairCraft(Craft):
-    """A satellite around its free test mass: the satellite as it is, and the largest measurements of each axis that can be true."""
+    """A satellite around its free test mass: as it is, and the largest measurements of each axis that can be true."""
 
     scheme_keys: ClassVar[type[Part]] = ForceAndTorqueLimits
     example: ClassVar[str | None] = "tao2019/case1"

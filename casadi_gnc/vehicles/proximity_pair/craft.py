@@ -44,7 +44,7 @@ _KEYS = {
 
 
 class ProximityPairCraft(Craft):
-    """A chaser beside a tumbling target: the chaser as it is, the point of the target that it holds, and the sphere that it must not enter."""
+    """A chaser beside a tumbling target: as it is, the point that it holds, the sphere that it must not enter."""
 
     scheme_keys: ClassVar[type[Part]] = ForceAndTorqueLimits
     example: ClassVar[str | None] = "sun2018/circular_orbit"
