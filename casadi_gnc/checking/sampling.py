@@ -13,6 +13,7 @@ from casadi_gnc.checking.linear import loop_at, spectral_radius
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
 from casadi_gnc.laws import Law
+from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
@@ -20,11 +21,14 @@ from casadi_gnc.missions.scheme import Scheme
 ROUNDING = 1e-6
 #: Shortest sample period [s] that is looked at, and the part to which the longest is found.
 _SHORTEST, _FINE = 1e-5, 0.01
+#: Steps that are searched for jumps at most, and the part of a step within which a jump is at its end.
+_MOST_STEPS, _AT_END = 1_000_000, 1e-6
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield the stability of the linearised loop at both ends of the flight, and with a sample of delay."""
+    """Yield jumps inside steps, and the stability of the linearised loop at both ends of the flight and delayed."""
     yield from _hold(scheme)
+    yield from _jumps(mission, scheme)
     if not mission.target:
         return
     loops = [loop_at(mission, scheme, t) for t in (0.0, _settled(mission))]
@@ -136,6 +140,41 @@ def _longest(law: Law) -> float:
         middle = (low + high) / 2
         low, high = (middle, high) if accepts(middle) else (low, middle)
     return low
+
+
+def _jumps(mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield in how many steps of the integrator a decision on time turns, if there are decisions on time."""
+    t, timing = ca.SX.sym("t"), mission.timing
+    decisions = Loop(mission, scheme).decisions(t)
+    if not decisions.numel():
+        return
+    h = timing.sample_period / timing.substeps
+    begins = h * np.arange(min((timing.samples - 1) * timing.substeps, _MOST_STEPS))
+    of = ca.Function("decisions", [t], [decisions])
+
+    def decided(times: np.ndarray) -> np.ndarray:
+        return np.array(of.map(times.size)(times[None, :]))
+
+    turned = decided(begins + _AT_END * h) != decided(begins + (1 - _AT_END) * h)
+    told = "A fault or profile changes"
+    if turned.any():
+        which, step = np.argwhere(turned)[np.argmin(np.argwhere(turned)[:, 1])]
+        low, high = begins[step], begins[step] + h
+        before = decided(np.array([low + _AT_END * h]))[which]
+        while high - low > _AT_END * h:
+            middle = (low + high) / 2
+            low, high = (middle, high) if decided(np.array([middle]))[which] == before else (low, middle)
+        told += f" at {high:.6g} s"
+    yield Check(
+        "sampling.jumps",
+        float(turned.any(axis=0).sum()),
+        0.0,
+        "-",
+        "warn",
+        f"{told}, inside a step of {h:g} s: the flight has it at an end of the step, and the step is of order 1.",
+        "Move it to a multiple of the step, or take sample_period_s or plant_substeps that put one there.",
+        "steps of the integrator inside which plant or law decide otherwise",
+    )
 
 
 def _hold(scheme: Scheme) -> Iterator[Check]:

@@ -1,5 +1,5 @@
-"""Arithmetic that gives the same words everywhere: bounds, exact constants, integrators, noise."""
+"""Arithmetic that gives the same words everywhere: bounds, exact constants, integrators, jumps in time, noise."""
 
-from casadi_gnc.mathematics import bounds, exact, integrators, noise
+from casadi_gnc.mathematics import bounds, exact, integrators, jumps, noise
 
-__all__ = ["bounds", "exact", "integrators", "noise"]
+__all__ = ["bounds", "exact", "integrators", "jumps", "noise"]

@@ -70,7 +70,7 @@ class Engine(Protocol):
 
 
 #: Ports that flights side by side have in common.
-SHARED = ("t", "length")
+SHARED = ("t", "middle", "length")
 
 
 class _Flight(ctypes.Structure):
@@ -137,6 +137,7 @@ def _places(sample: str) -> dict[str, str]:
         "memory": f"{sample}m",
         "told": f"{sample}actuators",
         "t": "t",
+        "middle": "middle",
         "x": "x",
         "m": "m",
         "noise": "noise",

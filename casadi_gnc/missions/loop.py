@@ -22,6 +22,7 @@ plant fits: what one leaves out is empty.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -29,6 +30,7 @@ import casadi as ca
 from casadi_gnc.laws import advance
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.integrators import runge_kutta
+from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.missions import asking
 from casadi_gnc.missions.navigated import Navigated
 from casadi_gnc.missions.scheme import Scheme
@@ -91,9 +93,36 @@ class Loop:
         return asking.column(self.plant, "rate", rate, self.plant.state)
 
     def stepped(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
-        """Return x one substep later, by one Runge-Kutta step under held actuators and noise."""
+        """Return x one substep later, by one Runge-Kutta step under held actuators and noise.
+
+        All stages are on the same side of what jumps in time: that of the middle.
+        """
         step = self.mission.timing.sample_period / self.mission.timing.substeps
-        return runge_kutta(lambda at, state: self.moved(at, state, actuators, noise), t, x, step)
+        timed, middle = self._rate, t + step / 2
+
+        def rate(at: Any, state: Any) -> Any:
+            if not timed.decides:
+                return self.moved(at, state, actuators, noise)
+            return timed.at(at, middle, {"x": state, "actuators": actuators, "noise": noise})
+
+        return runge_kutta(rate, t, x, step)
+
+    @cached_property
+    def _rate(self) -> Timed:
+        s = self.symbols()
+        return Timed(self.moved(s.t, s.x, s.actuators, s.noise), s.t, s.ports("x", "actuators", "noise"))
+
+    def decisions(self, t: Any) -> ca.SX:
+        """Return what plant and law decide on time within an integration step, at a time [s], (K, 1)."""
+        if self.mission.timing.mode == "sampled":
+            return self._rate.decisions(t)
+        s = self.symbols()
+        memory, wanted = self.commanded(s.t, self.seen(s.y), s.m)
+        made = ca.SX.sym("made", self.actuation.effort.size)
+        flowing = self.flowing(s.t, self.seen(s.y), memory, wanted, made)
+        slope = ca.vertcat(self.sensed(s.t, s.x, s.noise), wanted, self.moved(s.t, s.x, s.actuators, s.noise), flowing)
+        columns = {**s.ports("x", "y", "m", "actuators", "noise"), "made": made}
+        return Timed(slope, s.t, columns).decisions(t)
 
     def held(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
         """Return x one sample period later, its representation as it comes."""

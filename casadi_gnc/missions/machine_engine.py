@@ -66,7 +66,7 @@ class VirtualMachineEngine:
 
     def first(self, x: np.ndarray, derived: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the first measurement, and the law's memory at it."""
-        measured = self._tape["sense"].one(t=0.0, x=x, noise=self._draw(0), derived=derived)
+        measured = self._tape["sense"].one(t=0.0, middle=0.0, x=x, noise=self._draw(0), derived=derived)
         return measured, self._tape["start"].one(y=measured, derived=derived)
 
     def _draw(self, sample: int) -> np.ndarray:
@@ -81,7 +81,8 @@ class VirtualMachineEngine:
         """Fly sample by sample, as the loop of `flight.c.j2` does."""
         tape, kept = self._tape, 0
         for k in range(first, first + samples):
-            s: dict[str, Any] = {"t": k * self._timing.sample_period, "x": carried.x, "m": carried.m}
+            t = k * self._timing.sample_period
+            s: dict[str, Any] = {"t": t, "middle": t + self._timing.sample_period / 2, "x": carried.x, "m": carried.m}
             s = self._control(carried, {**s, "noise": self._draw(k)})
             s["flags"] = s["flags"] + s["allocation_flags"]
             carried.good[:] = s["accepted"]
@@ -125,7 +126,8 @@ class VirtualMachineEngine:
         slopes = [self._slope(s)]
         for length in (h / 2, h / 2, h):
             moved = tape["point"].one(state=state, slope=slopes[-1], length=length)
-            at = {"t": t + length, "x": moved[:n], "m": moved[n:], "noise": s["noise"], "derived": carried.derived}
+            at = {"t": t + length, "x": moved[:n], "m": moved[n:], "derived": carried.derived}
+            at |= {name: s[name] for name in ("middle", "noise")}
             slopes.append(self._slope(self._control(carried, at)))
         joined = tape["join"].one(state=state, **{f"k{i}": slope for i, slope in enumerate(slopes, 1)})
         carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -5,13 +5,14 @@ tape      from -> to
 ========  =====================================================================================
 start     y -> m, the law's memory at the first measurement
 draw      uniform -> noise, normal numbers                      (where the plant has noise)
-sense     t, x, noise -> y
-before    t, y, good, m, actuators -> accepted, memory, wanted, limited, lower, upper, flags
+sense     t, [middle], x, noise -> y
+before    t, [middle], y, good, m, actuators -> accepted, memory, wanted, limited, lower, upper, flags
 allocate  accepted, limited, actuators, lower, upper -> told     (where the allocation is symbolic)
 after     t, accepted, memory, wanted, limited, told -> m        (sampled mode)
 plant     t, x, told, noise -> x, one Runge-Kutta step           (sampled mode)
-flow      t, x, accepted, memory, wanted, limited, told, noise -> slope of x and m (continuous, other allocation)
-stage     t, x, noise, good, m, actuators -> slope, accepted, memory, wanted, limited, flags, told: sense
+flow      t, middle, x, accepted, memory, wanted, limited, told, noise -> slope of x and m (continuous, other
+          allocation)
+stage     t, middle, x, noise, good, m, actuators -> slope, accepted, memory, wanted, limited, flags, told: sense
           to flow in one that shares what they have in common   (continuous mode, symbolic allocation)
 point     state, slope, length -> moved, an integrator stage     (continuous mode)
 join      state, k1, k2, k3, k4 -> state, the stages' sum         (continuous mode)
@@ -20,6 +21,9 @@ observe   everything of a sample -> one row of the record
 tally     row, tally -> tally, the running metrics
 configure p -> derived, x: what follows from the parameters alone, and the start (where there are parameters)
 ========  =====================================================================================
+
+`middle` (continuous mode) is the time in the middle of the integrator's step, where all its stages take their
+decisions on time (`casadi_gnc.mathematics.jumps`); the tape `plant` knows its own.
 
 Ports have the names of columns, so whoever runs a tape, in C or by CasADi's machine, finds its arguments by
 name: `call` writes them down for the C, the engine keeps a dictionary of columns.
@@ -32,10 +36,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
+import numpy as np
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics import noise
 from casadi_gnc.mathematics.integrators import join
+from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.recording import observed, row_of
@@ -124,6 +130,9 @@ def tapes_of(mission: Mission, scheme: Scheme, parameters: Parameters | None = N
             flowing = loop.flowing(s.t, loop.seen(s.y), s.m, s.wanted, achieved)
             slope = ca.vertcat(loop.moved(s.t, s.x, s.actuators, s.noise), flowing)
             parts["flow"] = ({**s.ports("t", "x"), **sample, "noise": s.noise}, {"slope": slope})
+        for name in ("sense", "before", "flow", "stage"):
+            if name in parts:
+                parts[name] = _on_one_side(*parts[name])
         parts.update(_integrator(s.x.numel() + s.m.numel(), timing.sample_period))
     row = row_of(loop)
     watched = watches(mission.requirements, row, timing.sample_period)
@@ -170,6 +179,17 @@ def _stage(loop: Loop) -> Ports:
     slope = ca.vertcat(loop.moved(s.t, s.x, told, s.noise), moved)
     kept = {name: first[name] for name in ("accepted", "memory", "wanted", "limited", "flags")}
     return given, {"slope": slope, **kept, "told": told}
+
+
+def _on_one_side(inputs: dict[str, Any], outputs: dict[str, Any]) -> Ports:
+    """Return the ports of a part of a stage, `middle` among them, its decisions on time taken there."""
+    middle, columns = ca.SX.sym("middle"), {name: symbol for name, symbol in inputs.items() if name != "t"}
+    timed = Timed(ca.vertcat(*map(ca.vec, outputs.values())), inputs["t"], columns)
+    if timed.decides:
+        ends = np.cumsum([ca.SX(value).numel() for value in outputs.values()])
+        parts = ca.vertsplit(timed.at(inputs["t"], middle, columns), [0, *ends.tolist()])
+        outputs = dict(zip(outputs, parts, strict=True))
+    return {"t": inputs["t"], "middle": middle, **columns}, outputs
 
 
 def _integrator(size: int, h: float) -> dict[str, Ports]:

@@ -40,14 +40,17 @@ def disturbance(t):
     return np.array([0.005 * np.cos(0.02 * t), -0.005 * np.cos(0.025 * t), 0.006 * np.sin(0.04 * t)])
 
 
-def axis_faults(t):
-    """Factor and bias of each torque axis, the printed set: (e1, bias 2) at 5 s, e2 at 10 s, 3 from 5 to 15 s."""
-    early, late = (1 - np.exp(-(t - start)) if t >= start else 0.0 for start in (5.0, 10.0))
-    third = early if t < 15.0 else 0.0
+def axis_faults(t, middle):
+    """Factor and bias of each torque axis, the printed set: (e1, bias 2) at 5 s, e2 at 10 s, 3 from 5 to 15 s.
+
+    `middle` of the step says on which side of them its stages are.
+    """
+    early, late = (1 - np.exp(-(t - start)) if middle > start else 0.0 for start in (5.0, 10.0))
+    third = early if middle < 15.0 else 0.0
     return np.array([1 - 0.5 * early, 1 - 0.5 * late, 1 - third]), np.array([0.0, 0.2 * early, -0.2 * third])
 
 
-def no_faults(t):
+def no_faults(t, middle):
     return np.ones(3), np.zeros(3)
 
 
@@ -77,10 +80,10 @@ def fly(samples, *, centre_error=(0, 0, 0), j0=J0, umax=UMAX, scale=1.0, faults=
         eta_rate = -LAM * eta - LAM * (f - j0_inverse @ uc + y2 / TAU + LAM * s2)
         return uc, np.concatenate([s_rate, -y2 / TAU, -K4 * zeta + uc - u0, eta_rate])
 
-    def rate(t, x, m, n):
+    def rate(t, middle, x, m, n):
         uc, m_rate = law(x, m, n)
         accel = allocate(uc)
-        e, bias = faults(t)
+        e, bias = faults(t, middle)
         u = e * (c @ accel * JW) + bias
         w = x[3:6]
         torque = -cross(w, J @ w + c @ x[6:] * JW) - u + gravity(x[:3], J) + scale * disturbance(t)
@@ -93,12 +96,12 @@ def fly(samples, *, centre_error=(0, 0, 0), j0=J0, umax=UMAX, scale=1.0, faults=
     rows = []
     for k in range(samples):
         t, n = k * H, noise[k]
-        uc, accel, *k1 = rate(t, x, m, n)
+        uc, accel, *k1 = rate(t, t + H / 2, x, m, n)
         rows.append(np.concatenate([x, uc, accel]))
         slopes = [np.concatenate(k1)]
         for length in (H / 2, H / 2, H):
             xm = np.concatenate([x, m]) + length * slopes[-1]
-            slopes.append(np.concatenate(rate(t + length, xm[:10], xm[10:], n)[2:]))
+            slopes.append(np.concatenate(rate(t + length, t + H / 2, xm[:10], xm[10:], n)[2:]))
         moved = np.concatenate([x, m]) + H / 6 * (slopes[0] + 2 * slopes[1] + 2 * slopes[2] + slopes[3])
         x, m = moved[:10], moved[10:]
     rows = np.array(rows)
