@@ -14,6 +14,7 @@ def test_numbers_are_correctly_rounded(rng):
         m = mpmath.mpf(float(x))
         assert exact.phi1(x) == float(mpmath.expm1(m) / m if x else 1)
         assert exact.cos_sin(x) == (float(mpmath.cos(m)), float(mpmath.sin(m)))
+        assert exact.angle(*np.sort([x, -2.3])) == float(mpmath.atan2(max(m, -2.3), min(m, -2.3)))
         if x > 0:
             assert exact.log(float(x)) == float(mpmath.log(m))
 

@@ -69,8 +69,13 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
     """
     if not is_number(angle):
         return ca.cos(angle), ca.sin(angle)
+    cosine, sine = _cos_sin(Decimal(float(angle)))
+    return float(cosine), float(sine)
+
+
+def _cos_sin(angle: Decimal) -> tuple[Decimal, Decimal]:
     with localcontext(_CONTEXT):
-        halved, halvings = Decimal(float(angle)), 0
+        halved, halvings = angle, 0
         while abs(halved) > Decimal("0.1"):
             halved, halvings = halved / 2, halvings + 1
         sine, versine, term, order = Decimal(0), Decimal(0), halved, 1
@@ -82,7 +87,24 @@ def cos_sin(angle: Any) -> tuple[Any, Any]:
         cosine = 1 - versine
         for _ in range(halvings):
             sine, cosine = 2 * sine * cosine, 1 - 2 * sine * sine
-        return float(cosine), float(sine)
+        return cosine, sine
+
+
+def angle(cosine: Any, sine: Any) -> Any:
+    """Return the angle [rad] of a cosine and a sine times any positive length, rounded once; of symbols, atan2.
+
+    Newton's method from the machine's own value, whose error, e, leaves a part of e^3.
+    """
+    if not (is_number(cosine) and is_number(sine)):
+        return ca.atan2(sine, cosine)
+    with localcontext(_CONTEXT):
+        x, y = Decimal(float(cosine)), Decimal(float(sine))
+        length = (x * x + y * y).sqrt()
+        if not length:
+            return 0.0
+        first = Decimal(math.atan2(y, x))
+        c, s = _cos_sin(first)
+        return float(first + (y * c - x * s) / length)
 
 
 def log(x: Any) -> Any:

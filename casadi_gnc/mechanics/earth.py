@@ -102,10 +102,10 @@ def place(latitude: Any, longitude: Any, height: Any = 0.0) -> Any:
     height : above the ellipsoid, [m].
     """
     square = FLATTENING * (2 - FLATTENING)
-    sine, cosine = ca.sin(latitude), ca.cos(latitude)
-    normal = MAJOR_AXIS / ca.sqrt(1 - square * sine * sine)
+    (cosine, sine), (along, aside) = exact.cos_sin(latitude), exact.cos_sin(longitude)
+    normal = MAJOR_AXIS / exact.sqrt(1 - square * sine * sine)
     across = (normal + height) * cosine
-    return ca.vertcat(across * ca.cos(longitude), across * ca.sin(longitude), (normal * (1 - square) + height) * sine)
+    return ca.vertcat(across * along, across * aside, (normal * (1 - square) + height) * sine)
 
 
 def sunlight(position: Any, sun: Any, *, width: float | None = None, radius: float = MAJOR_AXIS) -> Any:

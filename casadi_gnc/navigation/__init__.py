@@ -2,5 +2,23 @@
 
 from casadi_gnc.navigation._navigation import Estimator, Navigation, Reference, Wanted
 from casadi_gnc.navigation.attitude_navigation import AttitudeNavigation
+from casadi_gnc.navigation.mekf import Mekf
+from casadi_gnc.navigation.profiles import Slew, Table, Timeline
+from casadi_gnc.navigation.references import GroundTarget, Inertial, Nadir, SunPointing, Tracking
 
-__all__ = ["AttitudeNavigation", "Estimator", "Navigation", "Reference", "Wanted"]
+__all__ = [
+    "AttitudeNavigation",
+    "Estimator",
+    "GroundTarget",
+    "Inertial",
+    "Mekf",
+    "Nadir",
+    "Navigation",
+    "Reference",
+    "Slew",
+    "SunPointing",
+    "Table",
+    "Timeline",
+    "Tracking",
+    "Wanted",
+]

@@ -1,0 +1,215 @@
+"""Attitudes by time alone: a slew about one axis, a table, and one reference after another.
+
+Source of the slew's profile: the time-optimal turn of one axis, bang, coast, bang. The table's spline is the natural
+cubic one (de Boor, A Practical Guide to Splines (1978), chapter IV), of each element of the quaternion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+
+from casadi_gnc.errors import LawError
+from casadi_gnc.mathematics import exact
+from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mechanics import quaternions
+from casadi_gnc.navigation._navigation import Reference, Wanted
+from casadi_gnc.signals import Layout
+
+#: Most rows of a table: each costs time in every sample.
+MOST_ROWS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Slew(Reference):
+    """Turn from one attitude to another about their common axis, at most at a rate and with an acceleration.
+
+    The rate is a trapezoid, or a triangle where the turn is short: constant acceleration, constant rate, constant
+    deceleration. Before the start and after the end the attitude stands.
+
+    Parameters
+    ----------
+    first, last : quaternions, (4,), of the wanted frame from inertial.
+    rate : largest, [rad/s].
+    acceleration : largest, [rad/s^2].
+    start : time at which it begins, [s].
+    """
+
+    first: Sequence[float]
+    last: Sequence[float]
+    rate: float
+    acceleration: float
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "acceleration"):
+            if not getattr(self, name) > 0:
+                raise LawError(f"the slew's {name} is {getattr(self, name):g}, expected more than 0")
+
+    @property
+    def turn(self) -> tuple[list[float], float]:
+        """Axis, (3,), and angle, [rad], of the turn, the short way."""
+        turn = quaternions.short_way(quaternions.relative(ca.DM(list(self.last)), ca.DM(list(self.first))))
+        sine = exact.sqrt(float(ca.sumsqr(turn[1:])))
+        if sine == 0.0:
+            return [1.0, 0.0, 0.0], 0.0
+        return [float(turn[i]) / sine for i in (1, 2, 3)], 2 * exact.angle(float(turn[0]), sine)
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """How long it speeds up, and how long it lasts, [s]."""
+        angle = self.turn[1]
+        rising = min(self.rate / self.acceleration, exact.sqrt(angle / self.acceleration))
+        return rising, (angle / (self.acceleration * rising) + rising if angle > 0 else 0.0)
+
+    def at(self, t: Any, known: Any) -> Wanted:
+        """Return what is wanted at time t [s]."""
+        (axis, angle), (rising, whole) = self.turn, self.times
+        if angle == 0.0:
+            return Wanted(array(list(self.first)))
+        fast, since = self.acceleration * rising, t - self.start
+        left = whole - since
+        early, late = since < rising, left < rising
+        gone = ca.if_else(
+            since <= 0,
+            0.0,
+            ca.if_else(
+                left <= 0,
+                angle,
+                ca.if_else(
+                    early,
+                    self.acceleration * since * since / 2,
+                    ca.if_else(late, angle - self.acceleration * left * left / 2, fast * (since - rising / 2)),
+                ),
+            ),
+        )
+        moving = ca.logic_and(since > 0, left > 0)
+        speed = ca.if_else(early, self.acceleration * since, ca.if_else(late, self.acceleration * left, fast))
+        push = ca.if_else(early, self.acceleration, ca.if_else(late, -self.acceleration, 0.0))
+        about = ca.DM(axis)
+        quaternion = quaternions.compose(
+            ca.vertcat(ca.cos(gone / 2), about * ca.sin(gone / 2)), ca.SX(ca.DM(list(self.first)))
+        )
+        return Wanted(quaternion, about * ca.if_else(moving, speed, 0.0), about * ca.if_else(moving, push, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Table(Reference):
+    """Follow a table of attitudes: a cubic spline through it, so that rate and acceleration are continuous.
+
+    Before the first time and after the last one, the attitude stands.
+
+    Parameters
+    ----------
+    times : K, rising, [s].
+    quaternions : K rows of four numbers, scalar first, of unit length; q and -q are told apart for nearness alone.
+
+    Raises
+    ------
+    LawError
+        For times that do not rise, rows that are no attitude, and neighbours more than a quarter turn apart.
+    """
+
+    times: Sequence[float]
+    quaternions: Sequence[Sequence[float]]
+
+    def __post_init__(self) -> None:
+        times, rows = [float(t) for t in self.times], [[float(each) for each in row] for row in self.quaternions]
+        if not 2 <= len(times) == len(rows) <= MOST_ROWS:
+            raise LawError(
+                f"a table of {len(times)} times and {len(rows)} attitudes, expected as many, 2 to {MOST_ROWS} rows"
+            )
+        for i, row in enumerate(rows):
+            if len(row) != 4 or not abs(sum(each * each for each in row) - 1) < 1e-5:
+                raise LawError(f"row {i + 1} of the table, {row}, is no unit quaternion of four numbers, scalar first")
+            if i == 0:
+                continue
+            if not times[i] > times[i - 1]:
+                raise LawError(f"row {i + 1} of the table is at {times[i]:g} s, not after row {i}, {times[i - 1]:g} s")
+            near = sum(a * b for a, b in zip(row, rows[i - 1], strict=True))
+            if abs(near) < math.cos(math.pi / 4):
+                turn = math.degrees(2 * math.acos(min(1.0, abs(near))))
+                raise LawError(
+                    f"the table jumps by {turn:.0f} degrees from {times[i - 1]:g} s to {times[i]:g} s, "
+                    "expected at most 90 from row to row; give rows in between"
+                )
+            if near < 0:
+                rows[i] = [-each for each in row]
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "quaternions", rows)
+
+    def at(self, t: Any, known: Any) -> Wanted:
+        """Return what is wanted at time t [s]."""
+        inside = ca.logic_and(t > self.times[0], t < self.times[-1])
+        now = ca.if_else(t > self.times[0], ca.if_else(inside, t, self.times[-1]), self.times[0])
+        symbol = ca.SX.sym("t")
+        path = quaternions.normalised(ca.vertcat(*(self._spline(symbol, i) for i in range(4))))
+        moving = ca.jacobian(path, symbol)
+        rate = 2 * (path[0] * moving[1:] - moving[0] * path[1:] - ca.cross(path[1:], moving[1:]))
+        told = ca.substitute(ca.vertcat(path, rate, ca.jacobian(rate, symbol)), symbol, ca.SX(now))
+        return Wanted(told[:4], ca.if_else(inside, told[4:7], 0.0), ca.if_else(inside, told[7:], 0.0))
+
+    def _spline(self, t: Any, i: int) -> Any:
+        """Return element i of the spline, inside the table."""
+        values = [row[i] for row in self.quaternions]
+        bends = _bends(self.times, values)
+        found: Any = None
+        for k in reversed(range(len(values) - 1)):
+            h = self.times[k + 1] - self.times[k]
+            a, b = (t - self.times[k]) / h, (self.times[k + 1] - t) / h
+            curve = (a**3 - a) * bends[k + 1] + (b**3 - b) * bends[k]
+            piece = a * values[k + 1] + b * values[k] + h * h / 6 * curve
+            found = piece if found is None else ca.if_else(t < self.times[k + 1], piece, found)
+        return found
+
+
+def _bends(times: Sequence[float], values: Sequence[float]) -> list[float]:
+    """Return the second derivatives of the natural cubic spline at its knots, by elimination."""
+    count = len(times)
+    upper, right, steps = [0.0] * count, [0.0] * count, [b - a for a, b in pairwise(times)]
+    for k in range(1, count - 1):
+        slope = (values[k + 1] - values[k]) / steps[k] - (values[k] - values[k - 1]) / steps[k - 1]
+        pivot = 2 * (steps[k - 1] + steps[k]) - steps[k - 1] * upper[k - 1]
+        upper[k], right[k] = steps[k] / pivot, (6 * slope - steps[k - 1] * right[k - 1]) / pivot
+    bends = [0.0] * count
+    for k in reversed(range(1, count - 1)):
+        bends[k] = right[k] - upper[k] * bends[k + 1]
+    return bends
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline(Reference):
+    """Follow one reference after another, each from its own time on.
+
+    Parameters
+    ----------
+    steps : (time [s], reference), times rising; the first counts from the start of the flight.
+    """
+
+    steps: Sequence[tuple[float, Reference]]
+
+    def __post_init__(self) -> None:
+        times = [time for time, _ in self.steps]
+        if not times or any(not later > earlier for earlier, later in pairwise(times)):
+            told = ", ".join(f"{time:g}" for time in times) or "no"
+            raise LawError(f"references from {told} s on, expected one or more, with rising times")
+
+    @property
+    def reads(self) -> Layout:
+        """What any of them reads."""
+        signals = {signal.name: signal for _, one in self.steps for signal in one.reads.signals}
+        return Layout(tuple(signals.values()))
+
+    def at(self, t: Any, known: Any) -> Wanted:
+        """Return what is wanted at time t [s]."""
+        found: Any = None
+        for time, one in self.steps:
+            wanted = one.at(t, known)
+            column = ca.vertcat(*(ca.SX(each) for each in (wanted.quaternion, wanted.rate, wanted.acceleration)))
+            found = column if found is None else ca.if_else(t >= time, column, found)
+        return Wanted(found[:4], found[4:7], found[7:])
