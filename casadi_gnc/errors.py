@@ -50,6 +50,10 @@ class NoCompilerError(CompilerError):
     """Report that no C compiler was found on this machine."""
 
 
+class GpuError(GncError):
+    """Report a GPU, its driver or its compiler that is missing or refuses."""
+
+
 class AllocationError(GncError):
     """Report allocation data that cannot be used: shapes, bounds, weights."""
 

@@ -126,6 +126,11 @@ class OnlineSolver:
         """Addresses of the constant data and of the workspace; valid as long as this object lives."""
         return self._data.ctypes.data, self._work.ctypes.data
 
+    @property
+    def contents(self) -> tuple[np.ndarray, int]:
+        """The constant data, as words, and the size of a workspace in words; several workspaces may share the data."""
+        return self._data, len(self._work)
+
     def reset(self) -> None:
         """Forget the previous answer; the next solve is cold."""
         self._c.allocator_reset(_pointer(self._work))

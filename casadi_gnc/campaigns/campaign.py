@@ -6,7 +6,7 @@ import dataclasses
 import math
 import shutil
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.campaigns.cases import Cases, Dispersion, Drawn, cases_of
+from casadi_gnc.campaigns.choosing import choose, refuse_unknown
 from casadi_gnc.campaigns.dispersions import DispersionTable
 from casadi_gnc.campaigns.draws import Purpose, check_seed, words
-from casadi_gnc.campaigns.engines import CompiledBatch, Flown
+from casadi_gnc.campaigns.engines import CompiledBatch
 from casadi_gnc.campaigns.plan import Plan
+from casadi_gnc.campaigns.program import BatchEngine, Flown, Program, program_of
 from casadi_gnc.campaigns.result import Campaign
 from casadi_gnc.campaigns.store import Columns, Store, has_arrow, keep_texts, read_identity, shards
 from casadi_gnc.embedded.printer import Math
@@ -34,6 +36,9 @@ _SHARD_SAMPLES = 3e7
 _LOOKED_AT = 64
 #: Called as told(cases done, cases in all).
 Told = Callable[[int, int], None]
+#: Called with a sentence.
+Said = Callable[[str], None]
+_Made = Callable[[int], BatchEngine]
 
 
 def campaign(
@@ -47,10 +52,13 @@ def campaign(
     out: str | Path | None = None,
     shard: tuple[int, int] = (1, 1),
     audit: int = 3,
+    engine: str = "auto",
+    scheduler: str | None = None,
     maths: Math = "gnc",
     vectors: str | None = None,
     threads: int | None = None,
     told: Told | None = None,
+    said: Said | None = None,
 ) -> Campaign:
     """Fly many cases of a mission and keep a row of each.
 
@@ -68,8 +76,12 @@ def campaign(
     out : folder of the rows; a temporary one by default, gone with the result.
     shard : (i, n), fly the i-th of n parts only: several machines fill one folder.
     audit : so many cases of each shard are flown again one by one in scalar C, and must have the same words.
+    engine : "c", vector lanes on threads; "cuda", an NVIDIA GPU; "dask", workers on this or other machines, each
+        flying as "c", or "dask:cuda"; "auto" takes the one that is done first by estimate. The words are the same.
+    scheduler : address of a dask scheduler, such as "tcp://host:8786"; without it "dask" starts workers here.
     maths, vectors, threads : as for `casadi_gnc.campaigns.engines.CompiledBatch`.
     told : called as cases are done.
+    said : called with a sentence that says which engine "auto" took, and why.
 
     Raises
     ------
@@ -80,6 +92,7 @@ def campaign(
         raise CampaignError(f"{flights} flights are asked for; expected 1 to 2^32")
     if not 1 <= shard[0] <= shard[1]:
         raise CampaignError(f"the shard is {shard[0]}/{shard[1]}; expected i/n with 1 <= i <= n")
+    refuse_unknown(engine, scheduler)
     varying = mission.dispersions if dispersions is None else dispersions
     cases = cases_of(mission, varying, plan, flights, check_seed(seed), scheme)
     flown = cases.varied.nominal
@@ -96,7 +109,15 @@ def campaign(
         store = Store(folder, _identity(cases, flights, varying, plan, maths))
         if flown.origin is not None:
             keep_texts(folder, _texts(flown.origin, varying))
-        _fly_missing(cases, store, shard, audit, maths, vectors, threads, told)
+        program = program_of(cases.varied, maths)
+
+        def make(left: int) -> BatchEngine:
+            choice = choose(engine, program, left, scheduler=scheduler, vectors=vectors, threads=threads)
+            if said and engine == "auto":
+                said(choice.why)
+            return choice.make()
+
+        _fly_missing(cases, store, shard, _Audit(program, cases.seed, audit), make, told)
     except BaseException:
         if out is None:
             shutil.rmtree(folder, ignore_errors=True)
@@ -145,59 +166,87 @@ def _texts(origin: Origin, dispersions: Sequence[Any]) -> dict[str, str]:
 
 
 def _fly_missing(
-    cases: Cases,
-    store: Store,
-    shard: tuple[int, int],
-    audit: int,
-    maths: Math,
-    vectors: str | None,
-    threads: int | None,
-    told: Told | None,
+    cases: Cases, store: Store, shard: tuple[int, int], audit: _Audit, make: _Made, told: Told | None
 ) -> None:
+    """Fly the shards that the store does not have, with the engine that `make` returns for their flights."""
     mine = [each for each in shards(store.identity) if each[0] % shard[1] == shard[0] - 1]
     total = sum(last - first for _, first, last in mine)
     missing = [each for each in mine if store.state(each[0]) != "whole"]
-    done = total - sum(last - first for _, first, last in missing)
-    if told:
-        told(done, total)
-    if not missing:
-        return
-    batch = CompiledBatch(cases.varied, maths, vectors=vectors, threads=threads)
-    for number, first, last in missing:
-        drawn = cases.draw(first, last)
-        good = np.array([not why for why in drawn.refused])
-        begun = done
+    left = sum(last - first for _, first, last in missing)
+    done = total - left
 
-        def counted(count: int, begun: int = begun) -> None:
-            nonlocal done
-            done += count
-            if told:
-                told(done, total)
-
-        flights = batch.fly(drawn.values[good], drawn.seeds[good], counted)
-        _audit(cases, drawn, good, flights, audit, maths)
-        store.write(number, _rows(cases, drawn, good, flights))
-        done = begun + last - first
+    def counted(count: int) -> None:
+        nonlocal done
+        done += count
         if told:
             told(done, total)
 
-
-def _audit(cases: Cases, drawn: Drawn, good: np.ndarray, flights: Flown, count: int, maths: Math) -> None:
-    """Fly some cases again in scalar C, and compare all words."""
-    flown = np.flatnonzero(good)
-    if not count or not len(flown):
+    counted(0)
+    if not missing:
         return
-    picks = words(cases.seed, Purpose.AUDIT, drawn.numbers[:1], count)[0] % np.uint64(len(flown))
-    chosen = np.unique(picks.astype(int))
-    alone = CompiledBatch(cases.varied, maths, vectors="none", threads=1)
-    again = alone.fly(drawn.values[flown[chosen]], drawn.seeds[flown[chosen]])
-    apart = (again.words != flights.words[chosen]).any(axis=1)
-    if apart.any():
-        number = int(drawn.numbers[flown[chosen[np.flatnonzero(apart)[0]]]])
-        raise CampaignError(
-            f"case {number} has other words when it is flown again in scalar C: the compiler has not kept the "
-            "arithmetic; nothing of its shard was kept. Take another compiler (CC=...), and tell its version"
-        )
+    engine = make(left)
+
+    def parts() -> Iterator[tuple[list[_Shard], np.ndarray, np.ndarray]]:
+        for some in _together(missing, engine.at_once):
+            drawn = [_Shard(number, cases.draw(first, last)) for number, first, last in some]
+            yield drawn, np.vstack([each.values for each in drawn]), np.concatenate([each.seeds for each in drawn])
+
+    try:
+        for together, flights in engine.fly_all(parts(), counted):
+            at = 0
+            for each in together:
+                own = flights.rows(at, at + len(each.seeds))
+                at += len(each.seeds)
+                audit.compare(each, own)
+                store.write(each.number, _rows(cases, each.drawn, each.good, own))
+                counted(int((~each.good).sum()))
+    finally:
+        engine.close()
+
+
+def _together(missing: list[tuple[int, int, int]], at_once: int) -> Iterator[list[tuple[int, int, int]]]:
+    """Yield runs of shards of at least so many cases."""
+    some: list[tuple[int, int, int]] = []
+    for each in missing:
+        some.append(each)
+        if sum(last - first for _, first, last in some) >= at_once:
+            yield some
+            some = []
+    if some:
+        yield some
+
+
+class _Shard:
+    """Hold the cases of a shard, and the numbers of those that fly."""
+
+    def __init__(self, number: int, drawn: Drawn) -> None:
+        self.number, self.drawn = number, drawn
+        self.good = np.array([not why for why in drawn.refused])
+        self.values, self.seeds = drawn.values[self.good], drawn.seeds[self.good]
+
+
+class _Audit:
+    """Fly some cases of each shard again in scalar C, and compare all words."""
+
+    def __init__(self, program: Program, seed: int, count: int) -> None:
+        self._program, self._seed, self._count = program, seed, count
+        self._alone: CompiledBatch | None = None
+
+    def compare(self, shard: _Shard, flights: Flown) -> None:
+        """Raise `CampaignError` where a case has other words in scalar C."""
+        if not self._count or not len(shard.seeds):
+            return
+        picks = words(self._seed, Purpose.AUDIT, shard.drawn.numbers[:1], self._count)[0] % np.uint64(len(shard.seeds))
+        chosen = np.unique(picks.astype(int))
+        self._alone = self._alone or CompiledBatch(self._program, vectors="none", threads=1)
+        again = self._alone.fly(shard.values[chosen], shard.seeds[chosen])
+        apart = (again.words != flights.words[chosen]).any(axis=1)
+        if apart.any():
+            number = int(shard.drawn.numbers[shard.good][chosen[np.flatnonzero(apart)[0]]])
+            raise CampaignError(
+                f"case {number} has other words when it is flown again in scalar C: the compiler has not kept the "
+                "arithmetic; nothing of its shard was kept. Take another compiler (CC=...), and tell its version"
+            )
 
 
 def _rows(cases: Cases, drawn: Drawn, good: np.ndarray, flights: Flown) -> Columns:

@@ -23,7 +23,12 @@ def campaign(
         str, typer.Option(help="independent, latin_hypercube, sobol, corners, one_at_a_time or grid:LEVELS.")
     ] = "independent",
     seed: Annotated[int, typer.Option(min=0, help="Of the cases and their noise.")] = 0,
-    engine: Annotated[str, typer.Option(help="auto or c: compiled vector lanes on threads.")] = "auto",
+    engine: Annotated[
+        str, typer.Option(help="c (lanes on threads), cuda, dask, dask:cuda, or auto: the first to be done.")
+    ] = "auto",
+    scheduler: Annotated[
+        str | None, typer.Option(help="Of dask, such as tcp://host:8786; left out, workers are started here.")
+    ] = None,
     shard: Annotated[str, typer.Option(help="i/n: only the i-th of n parts; machines may share a folder.")] = "1/1",
     audit: Annotated[int, typer.Option(min=0, help="Cases of each shard flown again in scalar C.")] = 3,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
@@ -49,8 +54,11 @@ def campaign(
         return
     if folder is not None:
         raise CampaignError(f"what is {str(folder)!r}? the folder of a campaign is given as --out {folder}")
-    if engine not in ("auto", "c"):
-        raise CampaignError(f"no engine {engine!r}; there is auto and c")
+
+    def said(sentence: str) -> None:
+        if not json:
+            typer.echo(sentence, err=True)
+
     with Progress("cases", quiet=json) as told:
         made = by_name.campaign(
             problem,
@@ -61,8 +69,11 @@ def campaign(
             out=out or Path("out") / f"{Path(problem).stem}-campaign",
             shard=parts_of(shard),
             audit=audit,
+            engine=engine,
+            scheduler=scheduler,
             threads=threads,
             told=told,
+            said=said,
         )
     _print(made, confidence, json)
 

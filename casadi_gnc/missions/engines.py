@@ -84,8 +84,20 @@ class _Flight(ctypes.Structure):
 _ALLOCATOR = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.POINTER(ctypes.c_double)] * 7)
 
 
-def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc", lanes: int = 1) -> str:
-    """Return the C of whole flights, `lanes` of them side by side: every tape and the loop over them."""
+def build_options(scheme: Scheme, maths: Math, optimise: str = "-O2") -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the compiler's flags for flights of a scheme one at a time, and the C files that belong to them."""
+    # Builtins would let the compiler replace the C library's functions by its own folding.
+    own = ("-fno-builtin",) if maths == "libm" else ()
+    allocator = scheme.actuation.allocator
+    if isinstance(allocator, OnlineInFlight):
+        return (*online.FAST, *own, *online.flags(allocator.problem)), online.units()
+    return (optimise, *own), ()
+
+
+def flight_source(
+    mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc", *, side_by_side: bool = False
+) -> str:
+    """Return the C of whole flights: every tape and the loop over them; side by side, LANES at once (-DLANES=4)."""
     plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
     configure = tapes.functions.get("configure")
 
@@ -96,7 +108,7 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
     return template("flight.c.j2").render(
         title=f"{mission.name}, scheme {scheme.name}",
         mode=timing.mode,
-        lanes=lanes,
+        side_by_side=side_by_side,
         maths=maths,
         real="double",
         states=plant.state.size,
@@ -122,7 +134,7 @@ def flight_source(mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = 
         fused=fused,
         call=called,
         tapes=[
-            print_function(tape, maths=maths, shared=None if lanes == 1 else SHARED)
+            print_function(tape, maths=maths, shared=SHARED if side_by_side else None)
             for name, tape in tapes.functions.items()
             if not (fused and name in ("before", "allocate"))
         ],
@@ -174,15 +186,12 @@ class CompiledEngine:
         self._report = scheme.actuation.allocator.report.size
         self.source = flight_source(mission, scheme, tapes, maths)
         self.compiler = compiler or compilers.find()
-        # Builtins would let the compiler replace the C library's functions by its own folding.
-        flags = (optimise, "-fno-builtin") if maths == "libm" else (optimise,)
-        include, units = assets.folder("codegen") / "runtime", ()
         allocator, self._online, self._solve = scheme.actuation.allocator, None, None
         if isinstance(allocator, OnlineInFlight):
             self._online = allocator.solver(self.compiler)
-            flags, units = (*online.FAST, *flags[1:], *online.flags(allocator.problem)), online.units()
         elif not tapes.symbolic:
             self._solve = allocator.start()
+        include, (flags, units) = assets.folder("codegen") / "runtime", build_options(scheme, maths, optimise)
         build = partial(compilers.load, self.source, include=include, flags=flags, units=units, compiler=self.compiler)
         self._library: Callable[[], ctypes.CDLL] = pool.submit(build).result if pool else partial(_same, build())
         self._memory = scheme.flown.memory.size

@@ -21,15 +21,15 @@ LOG = logging.getLogger("casadi_gnc")
 ENDING = ".dll" if os.name == "nt" else ".so"
 
 
-def find(folder: Path, key: str) -> Path | None:
-    """Return the library of a key, if it is there as it was built."""
+def find(folder: Path, key: str, ending: str = ENDING) -> Path | None:
+    """Return the library (or another build with that ending) of a key, if it is there as it was built."""
     try:
         said = json.loads((folder / f"{key}.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
     if not isinstance(said, dict) or not isinstance(said.get("sha256"), str):
         return None
-    library = folder / _name(key, said["sha256"])
+    library = folder / _name(key, said["sha256"], ending)
     try:
         found = {"size": library.stat().st_size, "sha256": _digest(library)}
     except OSError:
@@ -40,7 +40,7 @@ def find(folder: Path, key: str) -> Path | None:
     return library
 
 
-def keep(folder: Path, key: str, product: Path) -> Path:
+def keep(folder: Path, key: str, product: Path, ending: str = ENDING) -> Path:
     """Move a library that was just built, on the same disk, into a folder; return where it is.
 
     Raises
@@ -50,7 +50,7 @@ def keep(folder: Path, key: str, product: Path) -> Path:
     """
     os.chmod(product, 0o700)
     record = {"size": product.stat().st_size, "sha256": _digest(product)}
-    library = folder / _name(key, record["sha256"])
+    library = folder / _name(key, record["sha256"], ending)
     put_in_place(product, library)
     write_beside(folder / f"{key}.json", lambda place: place.write_text(json.dumps(record), encoding="utf-8"))
     return library
@@ -62,8 +62,8 @@ def forget(library: Path) -> None:
         library.with_name(f"{library.name.split('-')[0]}.json").unlink(missing_ok=True)
 
 
-def _name(key: str, sha256: str) -> str:
-    return f"{key}-{sha256[:16]}{ENDING}"
+def _name(key: str, sha256: str, ending: str = ENDING) -> str:
+    return f"{key}-{sha256[:16]}{ending}"
 
 
 def _digest(path: Path) -> str:

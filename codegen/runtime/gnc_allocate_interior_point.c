@@ -75,7 +75,7 @@ static real mean_product(const direction_t *dir, const iterate_t *it, real step,
 /* ---- the iteration ------------------------------------------------------------------------------ */
 
 /* Centre of the box, equal weights, equal products. */
-static int start(iterate_t *it, real *force, const data_t *data, const command_t *command, point_t *point)
+static int set_out(iterate_t *it, real *force, const data_t *data, const command_t *command, point_t *point)
 {
     int i, v, products = V;
     const real count = (real)(int)V;
@@ -172,7 +172,7 @@ static real mean_now(const iterate_t *it, int products)
 
 /* Take a step. Each force is measured from its nearer bound, so that none is lost in rounding; with care for digits
  * from zero where that is nearer still. */
-static void advance(iterate_t *it, real *force, const direction_t *dir, const command_t *command, real step)
+static void take_step(iterate_t *it, real *force, const direction_t *dir, const command_t *command, real step)
 {
     int i, v;
     for (i = 0; i < N; ++i) {
@@ -232,7 +232,7 @@ static int iterate(iterate_t *it, real *force, const data_t *data, const command
     if (!GNC_ASSERT(step > 0)) {
         return 0;
     }
-    advance(it, force, &dir, command, step);
+    take_step(it, force, &dir, command, step);
     return 1;
 }
 
@@ -243,7 +243,7 @@ int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t 
     real force[N], best, last = -1;
     int k, going;
     const int most = command->careful != 0 ? MAX_CAREFUL_STEPS : MAX_STEPS;
-    const int products = start(&it, force, data, command, point);
+    const int products = set_out(&it, force, data, command, point);
     rest(work, data, command, it.lambda, point);
     best = point->gap;
     going = !is_optimal(data, point);

@@ -20,7 +20,9 @@
 #include <math.h> /* sqrt, which gcc and clang know without a header */
 #endif
 
+#ifndef GNC_ALLOC_DECLARED /* defined by a unit that has included it and goes on with the source files themselves */
 #include "gnc_allocate.h"
+#endif
 #include "gnc_arithmetic.h"
 
 #if !defined(GNC_ALLOC_REAL_FLOAT)

@@ -113,8 +113,9 @@ def test_the_loops_over_lanes_are_vector_instructions(name, tmp_path):
     if "Free Software Foundation" not in subprocess.run(["gcc", "--version"], capture_output=True, text=True).stdout:
         pytest.skip("a report of GNU gcc")
     scheme, keys = FLOWN[name]
-    batch = CompiledBatch(vary(short(name), keys, scheme), vectors="avx2", threads=1)
-    hot = {"stage"} if "stage" in batch.tapes else {"plant", "before", "allocate", "after"}
+    varied = vary(short(name), keys, scheme)
+    batch = CompiledBatch(varied, vectors="avx2", threads=1)
+    hot = {"stage"} if "stage" in varied.tapes.functions else {"plant", "before", "allocate", "after"}
     assert hot <= vectorised(batch, tmp_path)
 
 
