@@ -12,7 +12,7 @@ n           standard normal numbers, fresh at every sample
 ==========  ================================================================================
 
 What is measured at sample k is true at that sample: there is no delay. A sensor with a longer `period` speaks at whole
-multiples of it; with that, or with drop-outs or a limited view, it has a signal NAME_valid that is 1 where its
+multiples of it; with a period, drop-outs or a limited view it has a signal NAME_valid that is 1 where its
 value may be used, and 0 where it may not.
 
 Gyro: Farrenkopf (1978), doi:10.2514/3.55779, with the noise of a sample arw/sqrt(h) and the bias's walk rrw sqrt(h).
@@ -42,22 +42,18 @@ class Sensor:
     Parameters
     ----------
     name : prefix of its signals.
-    hold : base period of the flight, [s].
+    hold : base period of the flight, [s], as a mission sets it; until then, 0.
     period : between two of its values, [s], a whole multiple of `hold`; 0: `hold`.
     dropout : chance that a value which is due does not come, 0 to below 1.
     """
 
     name: str
-    hold: float = field(kw_only=True)
+    hold: float = field(default=0.0, kw_only=True)
     period: float = field(default=0.0, kw_only=True)
     dropout: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
-        if not self.hold > 0:
-            raise FlightError(
-                f"{self.name}: the base period is {self.hold:g} s, expected more than 0; sensors are sampled"
-            )
-        if self.period and abs(self.period / self.hold - self.every) > 1e-9 * self.every:
+        if self.hold and self.period and abs(self.period / self.hold - self.every) > 1e-9 * self.every:
             raise FlightError(
                 f"{self.name}: a value every {self.period:g} s, expected a whole multiple of the sample period "
                 f"{self.hold:g} s, at least once"
@@ -68,12 +64,18 @@ class Sensor:
     @property
     def every(self) -> int:
         """Samples of the flight from value to value."""
-        return max(1, round(self.period / self.hold))
+        return max(1, round(self.period / self.hold)) if self.hold else 1
+
+    def density(self, walk: float) -> Any:
+        """Return walk/sqrt(h), what a random walk makes of a normal number that is held over a sample."""
+        if walk and not self.hold:
+            raise FlightError(f"{self.name}: noise needs a sample period; fly in mode sampled")
+        return walk / exact.sqrt(self.hold) if walk else 0.0
 
     @property
     def is_partial(self) -> bool:
         """Whether there is a signal NAME_valid."""
-        return self.every > 1 or self.dropout > 0
+        return self.period > 0 or self.dropout > 0
 
     @property
     def value(self) -> Signal:
@@ -130,6 +132,8 @@ class Sensor:
 
     def _due(self, t: Any) -> Any:
         """Return whether a value is due at a sample's time; a whole number is made of it first, for rounding."""
+        if self.every == 1:
+            return ca.SX(1)
         sample = ca.floor(t / self.hold + 0.5)
         return ca.fabs(sample - self.every * ca.floor((sample + 0.5) / self.every)) < 0.5
 
@@ -176,14 +180,14 @@ class Gyro(Sensor):
 
     def rate(self, t: Any, own: Any, drawn: Any) -> dict[str, Any]:
         """Return the bias's walk: held over a sample, it moves the bias by rrw sqrt(h) n."""
-        density = self.bias_random_walk / exact.sqrt(self.hold)
+        density = self.density(self.bias_random_walk)
         return {f"{self.name}_bias": density * getattr(drawn, f"{self.name}_walk")}
 
     def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
         """Return M w + bias + arw/sqrt(h) n."""
         turned = truth.rate - ca.cross(exact.array(self.misalignment), truth.rate)
         distorted = turned + exact.array(self.scale) * turned
-        density = self.angle_random_walk / exact.sqrt(self.hold)
+        density = self.density(self.angle_random_walk)
         return distorted + getattr(own, f"{self.name}_bias") + density * noise, 1.0
 
 

@@ -32,6 +32,10 @@ class Plant:
     #: True signals that are recorded besides the state.
     outputs: Any = Layout()
 
+    def timed(self, hold: float) -> Plant:
+        """Return the plant as it is when sampled every `hold` seconds, 0 in continuous flight: sensors may need it."""
+        return self
+
     def inertias(self) -> Mapping[str, Any]:
         """Return the inertias, (3, 3), [kg m^2], of the bodies that the plant moves, by what each is of."""
         return {}
