@@ -121,6 +121,25 @@ static void forget(workspace_t *work)
 
 /* ---- the solvers in turn ---------------------------------------------------------------------- */
 
+/* The active set from the last answer, within its budget, and if that does not arrive as from a reset workspace. */
+static int follow_sets(workspace_t *work, const data_t *data, command_t *command, point_t *point, int32_t *iterations)
+{
+    int certified = 0;
+    *iterations = 0;
+    if (work->warm != 0) {
+        certified = NAME(active_set)(work, data, command, point, iterations);
+    }
+    if (!certified) {
+        int32_t more = 0;
+        work->warm = 0;
+        work->smooth = 0;
+        work->stamp = 0;
+        certified = NAME(active_set)(work, data, command, point, &more);
+        *iterations += more;
+    }
+    return certified;
+}
+
 /* Degenerate: let the active set finish what the interior point began, or else return to where that ended. */
 static int finish(workspace_t *work, const data_t *data, command_t *command, point_t *point, int32_t *iterations)
 {
@@ -195,7 +214,7 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
     follow = fast != 0 && (data->regularised == 0 || data->distinct == 1);
     if (follow != 0) {
         result->path = GNC_ALLOC_PATH_ACTIVE_SET;
-        certified = NAME(active_set)(work, data, &command, &point, &result->active_set_iterations);
+        certified = follow_sets(work, data, &command, &point, &result->active_set_iterations);
     }
     if (!certified) {
         result->path = GNC_ALLOC_PATH_INTERIOR_POINT;

@@ -16,6 +16,9 @@
  * vertices that tie near zero net force it cycles.) The residuals are evaluated anew at each stop,
  * which makes it Newton's method for the curvature of q_v as well.
  *
+ * The path pays while it is short. Work that starts from the last answer has a budget (WARM_WORK): after a jump of the
+ * command most pieces of a long path would lie ahead, and starting anew costs less than walking it.
+ *
  * Two shortcuts save pieces. On a steady slew the step from the last sample is repeated in proportion
  * to the command first, so that the Newton step only corrects. Without a previous answer, and when only
  * one vertex exists, a few steps that do change all offenders at once come first, at fixed lambda.
@@ -25,7 +28,9 @@
 enum {
     MAX_PIECES = 28 + N,
     BLOCK_STEPS = 6, /* steps that change all offenders at once */
-    MAX_STUCK = 6    /* pieces of no length in a row: many obstacles at one point */
+    MAX_STUCK = 6,   /* pieces of no length in a row: many obstacles at one point */
+    WARM_WORK = 4,   /* what may be done from the last answer: a step costs one, with an obstacle two, short of half way all */
+    COLD_WORK = WARM_WORK * (MAX_PIECES + 1) /* no limit but that of pieces */
 };
 #define OPENING (real)0.01 /* room that open_up gives, of the box, the largest gradient, the worst q_v */
 #define SMALL (real)0.01   /* of the tolerance: a multiplier or slack this wrong does not show in the gap */
@@ -41,6 +46,7 @@ typedef struct {
     int smooth;      /* 1: no set has changed */
     int stuck;       /* pieces of no length so far in a row */
     int block_steps; /* steps that may change all offenders at once */
+    int work_left;   /* in units of WARM_WORK */
     real last_gap;   /* gap before the last step if that was a full one, else -1 */
 } path_t;
 
@@ -246,6 +252,7 @@ static void begin(path_t *path, real *force, real *lambda, workspace_t *work, co
     path->smooth = work->warm;
     path->stuck = 0;
     path->block_steps = work->warm != 0 && data->distinct > 1 ? 0 : BLOCK_STEPS;
+    path->work_left = work->warm != 0 ? WARM_WORK : COLD_WORK;
     path->last_gap = -1;
     if (work->warm == 0) {
         start_cold(work, data, command);
@@ -302,6 +309,7 @@ static int block_step(path_t *path, workspace_t *work, const data_t *data, const
         !NAME(newton_goal)(&goal, &vert, work, data, command, point)) {
         return 0;
     }
+    path->work_left -= 1;
     if (change_all_bounds(work, &goal, command) != 0) {
         path->smooth = 0;
     } else {
@@ -327,6 +335,7 @@ static int piece(path_t *path, workspace_t *work, const data_t *data, const comm
     path->last_gap = obstacle == NOTHING ? point->gap : -1;
     path->stuck = clear > (real)1e-6 ? 0 : path->stuck + 1;
     path->newcomer = NOTHING;
+    path->work_left -= obstacle == NOTHING ? 1 : clear < (real)0.5 ? WARM_WORK : 2;
     if (obstacle != NOTHING) {
         const int joins = obstacle < N ? work->side[obstacle] == 0 : work->active[obstacle - N] == 0;
         path->smooth = 0;
@@ -351,7 +360,7 @@ int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, 
         NAME(evaluate)(data, command, work->force, work->lambda, point);
         *iterations = k;
         arrived = is_there(&path, work, data, command, point);
-        going = !arrived && GNC_ASSERT(is_finite(point->gap));
+        going = !arrived && path.work_left > 0 && GNC_ASSERT(is_finite(point->gap));
         if (going && k < path.block_steps) {
             going = block_step(&path, work, data, command, point);
         } else if (going && k < MAX_PIECES) {

@@ -50,14 +50,17 @@ static void solve_for_T(workspace_t *work, real (*C)[K], const real *inverse)
     int i, k, l;
     for (k = 0; k < K; ++k) {
         real row[K];
+        UNROLLED
         for (l = 0; l < K; ++l) {
             row[l] = work->L[l][k];
         }
         for (i = 0; i < k; ++i) {
+            UNROLLED
             for (l = 0; l < K; ++l) {
                 row[l] -= C[k][i] * work->T[i][l];
             }
         }
+        UNROLLED
         for (l = 0; l < K; ++l) {
             work->T[k][l] = row[l] * inverse[k];
             work->Tt[l][k] = work->T[k][l];
@@ -108,8 +111,10 @@ int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
 static void multiply(real (*column)[K], const real *in, real *out)
 {
     int k, l;
-    real sum[K] = {0};
+    real sum[K];
+    set_zero(sum);
     for (l = 0; l < K; ++l) {
+        UNROLLED
         for (k = 0; k < K; ++k) {
             sum[k] += column[l][k] * in[l];
         }
@@ -122,6 +127,7 @@ static real product(const real *a, const real *b)
 {
     real even = 0, odd = 0;
     int k;
+    UNROLLED
     for (k = 0; k + 1 < K; k += 2) {
         even += a[k] * b[k];
         odd += a[k + 1] * b[k + 1];
@@ -149,10 +155,12 @@ static int list_vertices(vertices_t *vert, const workspace_t *work, const data_t
     }
     vert->count = count;
     for (a = 0; a < A && a < count; ++a) {
-        real z[K] = {0};
+        real z[K];
+        set_zero(z);
         v = vert->list[a];
         for (k = 0; k < R; ++k) {
             z[k] = point->r[k][v];
+            UNROLLED
             for (j = 0; j < P; ++j) {
                 z[R + j] += data->Dv[v][k][j] * z[k];
             }
@@ -231,6 +239,7 @@ static real weigh_vertices(const vertices_t *vert, int n, const point_t *point, 
         }
         dlambda[0] -= dlambda[a];
         dt -= product(vert->J[0], vert->J[a]) * dlambda[a];
+        UNROLLED
         for (k = 0; k < K; ++k) {
             eps[k] += vert->J[a][k] * dlambda[a];
         }
@@ -248,6 +257,7 @@ static void slack_at(goal_t *goal, const data_t *data, const point_t *point, con
     for (a = 0; a < R; ++a) {
         for (v = 0; v < V; ++v) {
             real move = dy[a];
+            UNROLLED
             for (j = 0; j < P; ++j) {
                 move += data->D[a][j][v] * dy[R + j];
             }
@@ -262,15 +272,17 @@ int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, c
 {
     int i, k, a;
     const int n = vert->count;
-    real d0[K] = {0}, eps[K], dy[K], nu[K], dlambda[A], t, dt;
+    real d0[K], eps[K], dy[K], nu[K], dlambda[A], t, dt;
     if (!GNC_ASSERT(is_within(n, 0, A))) {
         return 0;
     }
     t = n > 0 ? point->q[vert->list[0]] : point->worst;
+    set_zero(d0);
     for (i = 0; i < N; ++i) {
         const real bound = work->side[i] < 0 ? command->lower[i] : command->upper[i];
         const real d = work->side[i] != 0 ? bound - work->force[i] : -data->inv_curvature[i] * point->g[i];
         goal->force[i] = d;
+        UNROLLED
         for (k = 0; k < K; ++k) {
             d0[k] += data->St[i][k] * d;
         }
@@ -285,6 +297,7 @@ int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, c
     multiply(work->W, dy, nu);
     (void)memcpy(goal->lambda, work->lambda, sizeof goal->lambda);
     for (a = 0; a < n; ++a) {
+        UNROLLED
         for (k = 0; k < K; ++k) {
             nu[k] += vert->z[a][k] * dlambda[a];
         }
@@ -292,8 +305,9 @@ int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, c
     }
     for (i = 0; i < N; ++i) {
         real g = point->g[i];
+        UNROLLED
         for (k = 0; k < K; ++k) {
-            g += data->S[k][i] * nu[k];
+            g += data->St[i][k] * nu[k];
         }
         goal->bound[i] = work->side[i] != 0 ? g + data->q[i] * goal->force[i] : 0;
         goal->force[i] = work->force[i] + (work->side[i] != 0 ? goal->force[i] : -g * data->inv_curvature[i]);

@@ -22,6 +22,7 @@ static void vertex_gradients(real (*z)[V], const data_t *data, const point_t *po
     for (j = 0; j < P; ++j) {
         for (v = 0; v < V; ++v) {
             real sum = 0;
+            UNROLLED
             for (a = 0; a < R; ++a) {
                 sum += data->D[a][j][v] * point->r[a][v];
             }
@@ -44,6 +45,7 @@ static int factor_B(factors_t *fac, const iterate_t *it)
         for (k = 0; k < K; ++k) {
             column[k] = left[k][j];
             norm += column[k] * column[k];
+            UNROLLED
             for (l = 0; l < V; ++l) {
                 w[l] += column[k] * left[k][l];
             }
@@ -53,11 +55,13 @@ static int factor_B(factors_t *fac, const iterate_t *it)
         norm = SQUARE_ROOT(norm);
         inverse = 1 / norm;
         fac->inv_U[j] = inverse;
+        UNROLLED
         for (l = 0; l < V; ++l) {
             fac->U[j][l] = w[l] * inverse; /* needed for l > j only */
         }
         inverse = 1 / (d + norm);
         for (k = 0; k < K; ++k) {
+            UNROLLED
             for (l = 0; l < V; ++l) {
                 left[k][l] -= fac->U[j][l] * inverse * column[k];
             }
@@ -110,15 +114,18 @@ static void project_vertices(factors_t *fac)
 {
     int i, k, l, v;
     for (k = 0; k < K; ++k) {
+        UNROLLED
         for (v = 0; v < V; ++v) {
             fac->J[k][v] = 0;
         }
         for (i = k; i < K; ++i) {
+            UNROLLED
             for (v = 0; v < V; ++v) {
                 fac->J[k][v] += fac->L[i][k] * fac->z[i][v];
             }
         }
         for (l = 0; l < k; ++l) {
+            UNROLLED
             for (v = 0; v < V; ++v) {
                 fac->J[k][v] -= fac->C[k][l] * fac->J[l][v];
             }
@@ -161,6 +168,7 @@ static void vertex_direction(direction_t *dir, const factors_t *fac, const targe
         excess += it->lambda[v];
     }
     for (k = 0; k < K; ++k) {
+        UNROLLED
         for (v = 0; v < V; ++v) {
             dir->lambda[v] += fac->J[k][v] * eps[k];
         }
@@ -174,6 +182,7 @@ static void vertex_direction(direction_t *dir, const factors_t *fac, const targe
         dir->lambda[v] -= fac->B1[v] * dir->t;
     }
     for (k = 0; k < K; ++k) {
+        UNROLLED
         for (v = 0; v < V; ++v) {
             eps[k] -= fac->J[k][v] * dir->lambda[v];
         }
@@ -192,9 +201,11 @@ static void pull_on_forces(real *nu, const direction_t *dir, const factors_t *fa
     }
     for (k = 0; k < K; ++k) {
         nu[k] = 0;
+        UNROLLED
         for (i = 0; i < K; ++i) {
             nu[k] += fac->W[k][i] * dy[i];
         }
+        UNROLLED
         for (v = 0; v < V; ++v) {
             nu[k] += fac->z[k][v] * dir->lambda[v];
         }
@@ -205,11 +216,13 @@ static void pull_on_forces(real *nu, const direction_t *dir, const factors_t *fa
 static void slack_along(direction_t *dir, const factors_t *fac, const data_t *data, const real *dy)
 {
     int a, j, k, v;
+    UNROLLED
     for (v = 0; v < V; ++v) {
         dir->rise[v] = dir->t;
         dir->bend[v] = 0;
     }
     for (k = 0; k < K; ++k) {
+        UNROLLED
         for (v = 0; v < V; ++v) {
             dir->rise[v] -= fac->z[k][v] * dy[k];
         }
@@ -217,6 +230,7 @@ static void slack_along(direction_t *dir, const factors_t *fac, const data_t *da
     for (a = 0; a < R; ++a) {
         for (v = 0; v < V; ++v) {
             real move = dy[a];
+            UNROLLED
             for (j = 0; j < P; ++j) {
                 move += data->D[a][j][v] * dy[R + j];
             }
@@ -234,6 +248,7 @@ int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *t
     real rho[N], eps[K] = {0}, dy[K] = {0}, nu[K];
     for (i = 0; i < N; ++i) {
         rho[i] = -point->g[i] + target->zl[i] / it->down[i] - target->zu[i] / it->up[i];
+        UNROLLED
         for (k = 0; k < K; ++k) {
             eps[k] += data->St[i][k] * (rho[i] * fac->invd[i]);
         }
@@ -244,12 +259,14 @@ int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *t
     backward(fac->C, fac->inv_C, eps);
     pull_on_forces(nu, dir, fac, eps);
     for (i = 0; i < N; ++i) {
+        UNROLLED
         for (k = 0; k < K; ++k) {
             rho[i] -= data->S[k][i] * nu[k];
         }
         dir->F[i] = rho[i] * fac->invd[i];
         dir->zl[i] = (target->zl[i] - it->zl[i] * dir->F[i]) / it->down[i] - it->zl[i];
         dir->zu[i] = (target->zu[i] + it->zu[i] * dir->F[i]) / it->up[i] - it->zu[i];
+        UNROLLED
         for (k = 0; k < K; ++k) {
             dy[k] += data->St[i][k] * dir->F[i]; /* S dF: closer to the truth than L eps */
         }

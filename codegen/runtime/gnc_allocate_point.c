@@ -54,8 +54,10 @@ static void careful_residuals(const data_t *data, const command_t *command, cons
 static void plain_residuals(const data_t *data, const command_t *command, const real *force, point_t *point)
 {
     int i, k, a, j, v;
-    real y[K] = {0};
+    real y[K];
+    set_zero(y);
     for (i = 0; i < N; ++i) {
+        UNROLLED
         for (k = 0; k < K; ++k) {
             y[k] += data->St[i][k] * force[i];
         }
@@ -64,6 +66,7 @@ static void plain_residuals(const data_t *data, const command_t *command, const 
     for (a = 0; a < R; ++a) {
         for (v = 0; v < V; ++v) {
             real r = y[a] - command->b[a];
+            UNROLLED
             for (j = 0; j < P; ++j) {
                 r += data->D[a][j][v] * y[R + j];
             }
@@ -80,10 +83,12 @@ void NAME(residuals)(const data_t *data, const command_t *command, const real *f
     } else {
         plain_residuals(data, command, force, point);
     }
+    UNROLLED
     for (v = 0; v < V; ++v) {
         point->q[v] = 0;
     }
     for (a = 0; a < R; ++a) {
+        UNROLLED
         for (v = 0; v < V; ++v) {
             point->q[v] += (real)0.5 * point->r[a][v] * point->r[a][v];
         }
@@ -99,12 +104,14 @@ static void gradient(const data_t *data, const command_t *command, const real *f
                      const real *lambda, point_t *point)
 {
     int i, k, a, j, v;
-    real zbar[K] = {0};
+    real zbar[K];
+    set_zero(zbar);
     for (v = 0; v < V; ++v) {
         if (lambda[v] > 0) {
             for (a = 0; a < R; ++a) {
                 const real r = lambda[v] * point->r[a][v];
                 zbar[a] += r;
+                UNROLLED
                 for (j = 0; j < P; ++j) {
                     zbar[R + j] += data->Dv[v][a][j] * r;
                 }
@@ -113,8 +120,9 @@ static void gradient(const data_t *data, const command_t *command, const real *f
     }
     for (i = 0; i < N; ++i) {
         real g = data->q[i] * force[i] + command->c[i];
+        UNROLLED
         for (k = 0; k < K; ++k) {
-            g += data->S[k][i] * zbar[k];
+            g += data->St[i][k] * zbar[k];
         }
         point->g[i] = g;
     }
@@ -176,7 +184,9 @@ static real curvature_in_y(const data_t *data, const real *lambda, real (*W)[K])
 {
     int k, l, v;
     real sum = 0;
-    (void)memset(W, 0, K * sizeof *W);
+    for (k = 0; k < K; ++k) {
+        set_zero(W[k]);
+    }
     for (v = 0; v < V; ++v) {
         if (lambda[v] > 0) {
             int e = 0;
@@ -211,8 +221,10 @@ int NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], rea
     real WL[K][K];
     const real sum = curvature_in_y(data, lambda, W);
     for (k = 0; k < K; ++k) {
-        real row[K] = {0};
+        real row[K];
+        set_zero(row);
         for (i = 0; i < K; ++i) {
+            UNROLLED
             for (l = 0; l <= i; ++l) {
                 row[l] += W[k][i] * L[i][l];
             }
@@ -220,9 +232,11 @@ int NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], rea
         (void)memcpy(WL[k], row, sizeof row);
     }
     for (k = 0; k < K; ++k) {
-        real row[K] = {0};
+        real row[K];
+        set_zero(row);
         row[k] = 1;
         for (i = k; i < K; ++i) {
+            UNROLLED
             for (l = 0; l < K; ++l) {
                 row[l] += L[i][k] * WL[i][l];
             }
@@ -250,6 +264,7 @@ int NAME(factor)(real (*matrix)[K], real *inverse, real lost)
         inverse[j] = pivot > smallest ? row[j] * (1 / pivot) : 0;
         for (i = j + 1; i < K; ++i) {
             real entry = matrix[i][j];
+            UNROLLED
             for (k = 0; k < j; ++k) {
                 entry -= matrix[i][k] * row[k];
             }
