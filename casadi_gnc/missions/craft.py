@@ -168,6 +168,7 @@ REGISTRY = Registry(
             "wheel_spacecraft": "WheelSpacecraftCraft",
             "proximity_pair": "ProximityPairCraft",
             "drag_free_pair": "DragFreePairCraft",
+            "satellite": "SatelliteCraft",
         }.items()
     },
     is_one=lambda thing: (isinstance(thing, type) and issubclass(thing, Craft)) or isinstance(thing, Craft),

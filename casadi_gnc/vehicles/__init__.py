@@ -8,6 +8,13 @@ A craft's folder has
 * `checks.py`, where there is more to say before it flies than for every craft.
 """
 
-from casadi_gnc.vehicles import combined_spacecraft, docking_pair, drag_free_pair, proximity_pair, wheel_spacecraft
+from casadi_gnc.vehicles import (
+    combined_spacecraft,
+    docking_pair,
+    drag_free_pair,
+    proximity_pair,
+    satellite,
+    wheel_spacecraft,
+)
 
-__all__ = ["combined_spacecraft", "docking_pair", "drag_free_pair", "proximity_pair", "wheel_spacecraft"]
+__all__ = ["combined_spacecraft", "docking_pair", "drag_free_pair", "proximity_pair", "satellite", "wheel_spacecraft"]

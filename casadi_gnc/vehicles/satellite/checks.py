@@ -1,0 +1,50 @@
+"""What can be said of a satellite before it flies: its modes against the sampling, its wheels, its field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from casadi_gnc.checks import Check
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.scheme import Scheme
+
+if TYPE_CHECKING:
+    from .craft import SatelliteCraft
+
+#: Steps of the integrator that a period of the fastest motion needs to be followed to about 1e-4 of its amplitude.
+_STEPS = 20
+
+
+def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
+    """Yield whether modes and liquids are slow enough for the sampling and the integrator."""
+    timing = mission.timing
+    swings = [("flexible_mode", i, each.frequency_Hz) for i, each in enumerate(craft.flexible_mode, 1)]
+    swings += [("slosh", i, each.frequency_Hz) for i, each in enumerate(craft.slosh, 1)]
+    if not swings:
+        return
+    kind, number, fastest = max(swings, key=lambda each: each[2])
+    named = f"{kind} {number}"
+    if timing.mode == "sampled":
+        yield Check(
+            "sampling.mode_frequency",
+            fastest,
+            0.5 / timing.sample_period,
+            "Hz",
+            "fail",
+            f"{named} swings faster than half the sampling frequency: the law sees it at another frequency.",
+            "Sample faster, or leave the mode out.",
+            "Nyquist's frequency",
+        )
+    step = timing.sample_period / timing.substeps
+    yield Check(
+        "numbers.mode_steps",
+        2 * math.pi * fastest * step,
+        2 * math.pi / _STEPS,
+        "rad",
+        "note",
+        f"The integrator takes fewer than {_STEPS} steps for a period of {named}: its swing is not followed well.",
+        "Raise timing.plant_substeps.",
+        f"a period of the fastest motion has {_STEPS} steps",
+    )

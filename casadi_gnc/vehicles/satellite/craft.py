@@ -1,0 +1,270 @@
+"""A satellite by tables: a rigid body in [spacecraft], and a table for each thing that it carries.
+
+Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]]; [orbit],
+[field], [environment]; [truth], [initial]; [[reference]]. A class derived from this one adds parts of its own in
+`components`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import casadi as ca
+import numpy as np
+from pydantic import Field, model_validator
+
+from casadi_gnc.checks import Check
+from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics.exact import array, is_number
+from casadi_gnc.mechanics import quaternions
+from casadi_gnc.mechanics.multibody import Assembly, Component
+from casadi_gnc.mechanics.reaction_wheels import TorqueGyrostat, WheelArray
+from casadi_gnc.mechanics.rigid_body import RigidBody
+from casadi_gnc.missions.actuation import Actuators
+from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.navigation import AttitudeNavigation, Reference
+from casadi_gnc.tables import matrices
+from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, table
+
+from . import part_tables
+from .attitude_tables import InitialAttitude
+from .on_board import TorqueByField, WheelLimits
+from .orbit_tables import Environment, FieldTable, OrbitTable
+from .part_tables import FlexibleModeTable, MagnetorquerTable, SloshTable, ThrusterTable, WheelTable
+from .plant import Satellite
+from .surroundings import Surroundings
+
+#: Smallest over largest singular value of the effectiveness below which an axis is left out.
+_FLAT = 1e-9
+
+
+class Truth(Part):
+    """How the real craft differs from the known one."""
+
+    inertia_factor: Positive = 1.0
+    centre_of_mass_error_m: Vector = Field(default=[0.0, 0.0, 0.0], description="true minus known")
+
+
+class SatelliteCraft(Craft):
+    """A satellite of a rigid body and the parts that it carries; laws believe in it as known, liquids at rest."""
+
+    example: ClassVar[str | None] = "satellites/slew"
+
+    mass_kg: Positive = Field(description="with wheels and appendages, without [[slosh]]")
+    inertia_kg_m2: matrices.Inertia = Field(
+        description="about the centre of mass, body axes, wheels locked, appendages clamped, without [[slosh]]"
+    )
+    centre_of_mass_m: Vector = Field(default=[0.0, 0.0, 0.0], description="from the origin of positions")
+    rate_limit_rad_per_s: Positive = Field(default=10.0, description="larger measured rates per axis are rejected")
+    wheel: list[WheelTable] = table([], "a reaction wheel; there may be several")
+    thruster: list[ThrusterTable] = table([], "a thruster; there may be several")
+    magnetorquer: list[MagnetorquerTable] = table([], "a coil; there may be several")
+    flexible_mode: list[FlexibleModeTable] = table([], "a bending mode; there may be several")
+    slosh: list[SloshTable] = table([], "a mass of liquid; there may be several")
+    orbit: OrbitTable | None = table(None)
+    field: FieldTable | None = table(None)
+    environment: Environment = table(Environment())
+    truth: Truth = table(Truth())
+    initial: InitialAttitude = table(InitialAttitude())
+
+    @model_validator(mode="after")
+    def _complete(self) -> SatelliteCraft:
+        count = len(self.wheel) + len(self.thruster) + len(self.magnetorquer)
+        if not 0 < count <= MOST_ACTUATORS:
+            told = f"there are {count} wheels, thrusters and magnetorquers"
+            raise ValueError(f"{told}; give 1 to {MOST_ACTUATORS} [[wheel]], [[thruster]] or [[magnetorquer]]")
+        if self.magnetorquer and self.field is None:
+            raise ValueError('magnetorquers push against a magnetic field; give [field], e.g. model = "igrf"')
+        if self.field is not None:
+            self._field()
+        self._turning()
+        return self
+
+    def _field(self) -> Any:
+        """Return the magnetic field; raise `MisfitError` where the orbit does not say where and when."""
+        assert self.field is not None
+        epoch = None if self.orbit is None else self.orbit.when()
+        if epoch is None:
+            raise MisfitError("needs to know where and when; give [orbit] with an epoch", "field")
+        try:
+            return self.field.field(epoch)
+        except FlightError as error:
+            raise MisfitError(str(error), "orbit", "epoch") from None
+
+    def _turning(self) -> None:
+        """Raise `ValueError` where wheels or modes have more inertia than the body that carries them."""
+        smallest = np.linalg.eigvalsh(np.array(ca.DM(self._free_inertia())))[0]
+        if not smallest > 0:
+            raise ValueError(
+                "wheels and modes have more inertia about some axis than the body with them; inertia_kg_m2 is that of "
+                "the whole, and couplings of modes are in kg^0.5 m"
+            )
+
+    def components(self) -> Sequence[Component]:
+        """Return the parts that the body carries, in the order of states and commands."""
+        kinds: list[tuple[Any, Any]] = [
+            (self.wheel, part_tables.wheels),
+            (self.thruster, part_tables.thrusters),
+            (self.magnetorquer, part_tables.magnetorquers),
+            (self.flexible_mode, part_tables.modes),
+            (self.slosh, part_tables.slosh),
+        ]
+        return [made(tables) for tables, made in kinds if tables]
+
+    def assembly(self, inertia: Any = None, centre: Any = None) -> Assembly:
+        """Return body and parts, with another inertia [kg m^2] and centre of mass [m] where they are given."""
+        return Assembly(
+            self.mass_kg,
+            array(self.centre_of_mass_m if centre is None else centre),
+            array(self.inertia_kg_m2) if inertia is None else inertia,
+            tuple(self.components()),
+        )
+
+    def _at_rest(self) -> tuple[Any, Any]:
+        """Return inertia about the centre of mass and that centre as known, liquids at rest, appendages clamped."""
+        known = self.assembly()
+        rest = SimpleNamespace(**{each.name: ca.DM.zeros(each.size) for each in known.state.signals})
+        return known.inertia(rest), known.centre(rest)
+
+    def _free_inertia(self) -> Any:
+        """Return J - sum J_s g g', and without what the modes take along: what a sudden torque turns."""
+        free, centre = self._at_rest()
+        for each in self.wheel:
+            axis = part_tables.directions([each], "axis")
+            free = free - each.spin_inertia * ca.mtimes(axis, axis.T)
+        for mode in self.flexible_mode:
+            turned = array(mode.rotation_kg05_m) - ca.cross(centre, array(mode.translation_kg05))
+            free = free - ca.mtimes(turned, turned.T)
+        return free
+
+    def surroundings(self) -> Surroundings:
+        """Return what is outside."""
+        if self.orbit is None:
+            return Surroundings()
+        field = None if self.field is None else self._field().at
+        return Surroundings(self.orbit.gravity(), self.environment.gravity_gradient, field=field)
+
+    def pointed(self) -> Reference:
+        """Return where the satellite should point."""
+        return Reference()
+
+    def plant(self) -> Satellite:
+        """Return the truth."""
+        centre = [c + e for c, e in zip(self.centre_of_mass_m, self.truth.centre_of_mass_error_m, strict=True)]
+        return Satellite(
+            self.assembly(array(self.inertia_kg_m2) * self.truth.inertia_factor, centre),
+            self.surroundings(),
+            self.environment.disturbance(),
+            self.rate_limit_rad_per_s,
+            reference=self.pointed(),
+        )
+
+    def start(self) -> dict[str, Any]:
+        """Return the state at t = 0."""
+        place = (
+            {}
+            if self.orbit is None
+            else dict(zip(("position", "velocity"), self.orbit.elements().state(), strict=True))
+        )
+        turned, rate = self.initial.quaternion(), self.initial.rate()
+        if self.initial.relative_to == "reference":
+            wanted = self.pointed().at(0.0, SimpleNamespace(**place))
+            rate = rate + ca.mtimes(quaternions.dcm(turned), wanted.rate)
+            turned = quaternions.compose(turned, wanted.quaternion)
+        parts = {name: value for part in self.components() for name, value in part.start().items()}
+        mrp = quaternions.to_mrp(turned)
+        first = {"mrp": mrp, "rate": rate, **parts, **place}
+        return {name: array(value).elements() for name, value in first.items()}
+
+    def belief(self) -> RigidBody:
+        """Return the body as known, with its wheels."""
+        inertia, _ = self._at_rest()
+        if not self.wheel:
+            return RigidBody(inertia)
+        wheels = part_tables.wheels(self.wheel)
+        spin = array(wheels.spin_inertia)
+        own = ca.mtimes([wheels.axes, ca.diag(spin), wheels.axes.T])
+        return TorqueGyrostat(inertia - own, wheels=WheelArray(wheels.axes, spin))
+
+    def navigation(self) -> AttitudeNavigation:
+        """Return what laws read: attitude relative to the reference, and what else is measured."""
+        measured = self.plant().measurement
+        passed = tuple(signal for signal in measured.signals if signal.name not in ("mrp", "rate"))
+        return AttitudeNavigation(reference=self.pointed(), passed=type(measured)(passed))
+
+    def actuators(self) -> Actuators:
+        """Return wheels, thrusters and coils as known."""
+        _, centre = self._at_rest()
+        rows = []
+        if self.wheel:
+            rows.append(-part_tables.directions(self.wheel, "axis"))
+        if self.thruster:
+            rows.append(part_tables.thrusters(self.thruster).arms(centre))
+        fixed = ca.horzcat(ca.DM(3, 0), *rows)
+        most = [each.max_torque_N_m for each in self.wheel]
+        dipoles = [each.max_dipole_A_m2 for each in self.magnetorquer]
+        lower = [-each for each in most] + [each.min_force_N for each in self.thruster] + [-each for each in dipoles]
+        upper = most + [each.max_force_N for each in self.thruster] + dipoles
+        effectiveness: Any = fixed
+        if self.magnetorquer:
+            effectiveness = TorqueByField(fixed, part_tables.directions(self.magnetorquer, "axis"))
+        speeds = tuple(each.max_speed for each in self.wheel)
+        limits = None
+        if any(not is_number(speed) or speed != math.inf for speed in speeds):
+            spin = tuple(each.spin_inertia for each in self.wheel)
+            limits = WheelLimits(speeds, spin, tuple(lower), tuple(upper))
+        return Actuators(
+            effectiveness=effectiveness,
+            lower=lower,
+            upper=upper,
+            reach=None if limits is None else limits.reach,
+            judge=None if limits is None else limits.judge,
+        )
+
+    def regulated(self, mission: Mission) -> dict[str, list[float]]:
+        """Return the attitude of a reference that stays, and rest; of one that moves, nothing."""
+        if type(self.pointed()) is not Reference:
+            return {}
+        return {"mrp": [0.0] * 3, "rate": [0.0] * 3}
+
+    def panels(self, mission: Mission) -> tuple[Panel, ...]:
+        """Return pointing, rate, torque, and what makes it."""
+        shown = [
+            Panel("lines", "pointing_error_deg", "pointing error"),
+            Panel("lines", "rate", "rate"),
+            Panel("effort", "torque", "torque"),
+        ]
+        names = {"wheel_torque": "wheel torque", "force": "force", "dipole": "dipole"}
+        shown += [Panel("actuators", name, text) for name, text in names.items() if name in mission.truth.inputs]
+        if self.wheel:
+            shown.append(Panel("lines", "wheel_speed", "wheel speed"))
+        return tuple(shown)
+
+    def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
+        """Yield what can be said of a satellite before it flies."""
+        from .checks import checks
+
+        return checks(self, mission, scheme)
+
+    def flaws(self) -> Iterator[MisfitError]:
+        """Yield whether wheels and thrusters leave an axis out."""
+        if self.magnetorquer:
+            return
+        made = np.array(ca.DM(self.actuators().matrix(None)))
+        strength = np.linalg.svd(made, compute_uv=False)
+        if len(strength) < 3 or strength[2] < _FLAT * strength[0]:
+            what = " and ".join(name for name, there in (("wheels", self.wheel), ("thrusters", self.thruster)) if there)
+            key = "wheel" if self.wheel else "thruster"
+            flat = np.linalg.svd(made)[0][:, -1]
+            axis = ", ".join(f"{value + 0.0:.3g}" for value in flat)
+            yield MisfitError(f"the {what} make no torque about the axis ({axis}); add or turn one", key)
+
+    def key_of(self, signal: str) -> tuple[str, ...]:
+        """Return the key of the file that gives a state at the start."""
+        return {"rate": ("initial", "rate_rad_per_s"), "wheel_speed": ("wheel",)}.get(signal, ("initial",))

@@ -1,0 +1,69 @@
+"""What the flight software of a satellite knows of its actuators: what they make, and how far they reach."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.status import StepStatus
+
+#: Share of the limit from which a wheel counts as saturated, less one.
+_NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueByField:
+    """Give the effectiveness of a satellite whose coils push against the measured field.
+
+    Parameters
+    ----------
+    fixed : torque per command of wheels and thrusters, (3, N).
+    coils : axes of the coils, (3, K), which come last.
+    """
+
+    fixed: Any
+    coils: Any
+
+    def __call__(self, seen: Any) -> Any:
+        """Return the torque per command, (3, N + K): of a coil axis x B."""
+        made = ca.mtimes(-ca.skew(seen.magnetic_field), self.coils)
+        return ca.horzcat(ca.SX(self.fixed), made)
+
+
+@dataclass(frozen=True, eq=False)
+class WheelLimits:
+    """Keep wheels below their largest speed; what comes after the wheels is free.
+
+    Parameters
+    ----------
+    speeds, spin : largest speed [rad/s] and inertia [kg m^2] of each wheel, (N,).
+    lower, upper : bounds of all actuators.
+    """
+
+    speeds: tuple[Any, ...]
+    spin: tuple[Any, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+    def reach(self, seen: Any, period: float) -> tuple[Any, Any]:
+        """Return bounds of all commands within which no motor drives its wheel past the limit in one period [s]."""
+        least, most = list(self.lower), list(self.upper)
+        for i, (fastest, spin) in enumerate(zip(self.speeds, self.spin, strict=True)):
+            if fastest != math.inf:
+                speed = seen.wheel_speed[i]
+                least[i] = bounds.clip((-fastest - speed) * spin / period, self.lower[i], self.upper[i])
+                most[i] = bounds.clip((fastest - speed) * spin / period, self.lower[i], self.upper[i])
+        return ca.vertcat(*least), ca.vertcat(*most)
+
+    def judge(self, seen: Any, limited: Any, actuators: Any) -> dict[StepStatus, Any]:
+        """Return whether a wheel is at its limit."""
+        full = [
+            ca.fabs(seen.wheel_speed[i]) >= (1 - _NEAR) * fastest
+            for i, fastest in enumerate(self.speeds)
+            if fastest != math.inf
+        ]
+        return {StepStatus.WHEEL_SATURATED: bounds.any_of(ca.vertcat(*full))}
