@@ -3,6 +3,7 @@
 # make test     style, types and the fast tests: about ten minutes on two cores
 # make test-all style, types and every test; needs clang, clang-tidy, cppcheck, g++ and `make targets`, fetches
 #               600 MB of programs to compare with, and skips by name what a missing one prevents (with CI=true: fails)
+# make test-rest  what `make test` left out of test-all
 # make test-long  hundreds of kills and thousands of mutated files, of which test-all takes some: some hours
 # make gates    the hand-written flight C: warnings, MISRA, analysers, coverage, fuzzing under sanitizers; needs
 #               clang, clang-tidy, cppcheck and g++
@@ -21,11 +22,11 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test test-all test-long test-oldest lock bench ratios gates targets pictures lint docs clean
+.PHONY: demo test test-all test-rest test-long test-oldest lock bench ratios gates targets pictures lint docs clean
 
 # One BLAS thread a process: two processes share the cores.
 PYTEST := -m pytest -q -n 2
-test test-all test-long test-oldest: export OPENBLAS_NUM_THREADS = 1
+test test-all test-rest test-long test-oldest: export OPENBLAS_NUM_THREADS = 1
 # Tests that need more than the README asks for, and tests that take long, are in `make test-all` alone.
 FAST := -m 'not tools and not packages and not slow and not long'
 
@@ -37,6 +38,9 @@ test: .venv/installed-dev lint
 
 test-all: .venv/installed-oracles lint
 	$(BIN)/python $(PYTEST) -m 'not long'
+
+test-rest: .venv/installed-oracles
+	$(BIN)/python $(PYTEST) -m '(tools or packages or slow) and not long'
 
 test-long: .venv/installed-dev
 	$(BIN)/python $(PYTEST) -m long

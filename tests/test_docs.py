@@ -52,7 +52,7 @@ def test_links_lead_to_files():
     for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md")):
         prose = re.sub(r"```.*?```|`[^`\n]*`", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
         for target in re.findall(r"\]\(([^)#]+)\)", prose):
-            if "://" not in target:
+            if "://" not in target and not target.startswith("catalogue/"):  # made where the documentation is built
                 assert (page.parent / target).exists(), f"{page.name} -> {target}"
 
 

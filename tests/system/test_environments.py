@@ -99,6 +99,7 @@ def test_no_temporary_folder_is_needed_where_the_cache_serves(place):
     assert run(place, ALLOCATE, TMPDIR="/nonexistent", CASADI_GNC_CACHE=str(place / "a")).stdout == answer()
 
 
+@pytest.mark.tools("mount", "unshare")
 @pytest.mark.skipif(not can_mount(), reason="no file system can be mounted here")
 class TestFileSystems:
     @pytest.mark.parametrize("options", ["noexec", "ro", "full", "size=1m"])

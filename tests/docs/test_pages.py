@@ -1,0 +1,32 @@
+"""Commands and scripts at the head of pages, every block as it stands there; and what pages name is there."""
+
+import re
+
+import pytest
+from running_pages import ROOT, run, sections
+
+from casadi_gnc.problem_files.document import shipped
+
+PAGES = ["allocation", "check", "docking", "flight_c", "synthesis"]
+HEADS = [(f"{page}.md", sections(f"{page}.md")[0]) for page in PAGES]
+
+
+@pytest.mark.slow  # first_law is the page that the fast tests run
+@pytest.mark.parametrize(
+    ("page", "section"),
+    [pytest.param(page, head.title, marks=pytest.mark.tools(*head.tools) if head.tools else ()) for page, head in HEADS],
+    ids=PAGES,
+)
+def test_head(page, section, tmp_path):
+    run(page, section, tmp_path)
+
+
+def test_problems_that_pages_call_are_shipped():
+    """The pages of the papers' missions fly them by name, as tests/missions does."""
+    called = {}
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        for name in re.findall(r"casadi-gnc (?:[a-z]+ )+([a-z0-9]+/\w+)", page.read_text(encoding="utf-8")):
+            called.setdefault(name, page.name)
+    assert len(called) > 20
+    own = ("flight/", "out/", "examples/")  # folders that the page itself makes or the repository has
+    assert {name: page for name, page in called.items() if name not in shipped() and not name.startswith(own)} == {}
