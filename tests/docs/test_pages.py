@@ -11,12 +11,13 @@ PAGES = ["allocation", "check", "docking", "flight_c", "synthesis"]
 HEADS = [(f"{page}.md", sections(f"{page}.md")[0]) for page in PAGES]
 
 
+CASES = [
+    pytest.param(page, head.title, marks=[pytest.mark.tools(*head.tools)] * bool(head.tools)) for page, head in HEADS
+]
+
+
 @pytest.mark.slow  # first_law is the page that the fast tests run
-@pytest.mark.parametrize(
-    ("page", "section"),
-    [pytest.param(page, head.title, marks=pytest.mark.tools(*head.tools) if head.tools else ()) for page, head in HEADS],
-    ids=PAGES,
-)
+@pytest.mark.parametrize(("page", "section"), CASES, ids=PAGES)
 def test_head(page, section, tmp_path):
     run(page, section, tmp_path)
 
