@@ -1,0 +1,101 @@
+"""A satellite in Basilisk, by the keys that our craft takes: balanced wheels, liquids on springs, thrusters, gravity.
+
+Basilisk integrates position and velocity of the body's origin besides; its wheels' Coulomb friction is a sign where
+ours is a tanh, so wheels must not cross zero.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def fly(
+    keys: dict[str, Any], start: dict[str, Any], *, h: float, duration: float, told: dict[str, list[float]]
+) -> dict:
+    """Return mrp, rate, wheel_speed, slosh at the samples of a flight under constant commands.
+
+    Parameters
+    ----------
+    keys : of our craft.
+    start : state at t = 0 by signal, as our craft gives it.
+    told : commands: wheel_torque, force.
+    """
+    from Basilisk.architecture import messaging
+    from Basilisk.simulation import (
+        GravityGradientEffector,
+        extForceTorque,
+        gravityEffector,
+        linearSpringMassDamper,
+        reactionWheelStateEffector,
+        spacecraft,
+    )
+    from Basilisk.utilities import SimulationBaseClass, macros, simIncludeRW
+
+    kept: list[Any] = []  # what Basilisk does not keep alive
+    simulation, craft = SimulationBaseClass.SimBaseClass(), spacecraft.Spacecraft()
+    simulation.CreateNewProcess("process").addTask(simulation.CreateNewTask("task", macros.sec2nano(h)))
+    simulation.AddModelToTask("task", craft, 1)
+    column = lambda values: [[float(value)] for value in values]  # noqa: E731
+    craft.hub.mHub, craft.hub.IHubPntBc_B = keys["mass_kg"], keys["inertia_kg_m2"]
+    craft.hub.r_BcB_B = column(keys.get("centre_of_mass_m", [0.0] * 3))
+    craft.hub.sigma_BNInit, craft.hub.omega_BN_BInit = column(start["mrp"]), column(start["rate"])
+    craft.hub.r_CN_NInit = column(start.get("position", [0.0] * 3))
+    craft.hub.v_CN_NInit = column(start.get("velocity", [0.0] * 3))
+    if "orbit" in keys:
+        earth = gravityEffector.GravBodyData()
+        earth.planetName, earth.mu, earth.isCentralBody = "earth_planet_data", 3.986004418e14, True
+        craft.gravField.gravBodies = spacecraft.GravBodyVector([earth])
+        gradient = GravityGradientEffector.GravityGradientEffector()
+        gradient.addPlanetName(earth.planetName)
+        craft.addDynamicEffector(gradient)
+        simulation.AddModelToTask("task", gradient, 2)
+        kept += [earth, gradient]
+    recorders = {"craft": craft.scStateOutMsg.recorder()}
+    if keys.get("wheel"):
+        wheels, factory = reactionWheelStateEffector.ReactionWheelStateEffector(), simIncludeRW.rwFactory()
+        for wheel, speed in zip(keys["wheel"], start["wheel_speed"], strict=True):
+            made = factory.create("custom", wheel["axis"], Js=wheel["inertia_kg_m2"], Omega=0.0, useMaxTorque=False)
+            made.gsHat_B, made.Omega = column(np.array(wheel["axis"]) / np.linalg.norm(wheel["axis"])), float(speed)
+            made.cViscous, made.fCoulomb = wheel.get("viscous_N_m_s_per_rad", 0.0), wheel.get("coulomb_N_m", 0.0)
+        factory.addToSpacecraft("wheels", wheels, craft)
+        command = messaging.ArrayMotorTorqueMsg().write(
+            messaging.ArrayMotorTorqueMsgPayload(motorTorque=list(told["wheel_torque"]))
+        )
+        wheels.rwMotorCmdInMsg.subscribeTo(command)
+        simulation.AddModelToTask("task", wheels, 3)
+        recorders["wheels"] = wheels.rwSpeedOutMsg.recorder()
+        kept += [wheels, factory, command]
+    liquids = []
+    for i, liquid in enumerate(keys.get("slosh", [])):
+        mass, turn = linearSpringMassDamper.LinearSpringMassDamper(), 2 * np.pi * liquid["frequency_Hz"]
+        mass.massInit, mass.k = liquid["mass_kg"], liquid["mass_kg"] * turn**2
+        mass.c = 2 * liquid["damping"] * liquid["mass_kg"] * turn
+        mass.r_PB_B, mass.pHat_B = column(liquid["position_m"]), column(liquid["axis"])
+        mass.rhoInit, mass.rhoDotInit = float(start["slosh"][i]), 0.0
+        craft.addStateEffector(mass)
+        liquids.append(mass)
+    if keys.get("thruster"):
+        force = sum(f * np.array(one["direction"]) for f, one in zip(told["force"], keys["thruster"], strict=True))
+        torque = sum(
+            f * np.cross(one["position_m"], one["direction"])
+            for f, one in zip(told["force"], keys["thruster"], strict=True)
+        )
+        push = extForceTorque.ExtForceTorque()  # a thruster that burns steadily: force, and torque about the origin
+        push.extForce_B, push.extTorquePntB_B = column(force), column(torque)
+        craft.addDynamicEffector(push)
+        simulation.AddModelToTask("task", push, 4)
+        kept.append(push)
+    for recorder in recorders.values():
+        simulation.AddModelToTask("task", recorder)
+    simulation.InitializeSimulation()
+    logged = [craft.dynManager.getStateObject(mass.nameOfRhoState) for mass in liquids]
+    simulation.ConfigureStopTime(macros.sec2nano(duration))
+    simulation.ExecuteSimulation()
+    found = {"mrp": np.array(recorders["craft"].sigma_BN), "rate": np.array(recorders["craft"].omega_BN_B)}
+    if "wheels" in recorders:
+        found["wheel_speed"] = np.array(recorders["wheels"].wheelSpeeds)[:, : len(keys["wheel"])]
+    if liquids:
+        found["slosh"] = np.array([each.getState()[0][0] for each in logged])  # at the end
+    return found
