@@ -9,11 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
-from casadi_gnc.campaigns.designs import Corners, Grid, OneAtATime
 from casadi_gnc.campaigns.distributions import Distribution
 from casadi_gnc.campaigns.draws import Purpose, words
+from casadi_gnc.campaigns.naming import Parts, plan_of
 from casadi_gnc.campaigns.plan import Plan
-from casadi_gnc.campaigns.plans import Independent, LatinHypercube, Sobol
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.parameters import Varied, vary
@@ -55,12 +54,14 @@ class Cases:
     distributions : of the parameters, one after the other.
     plan : of the unit cube of all of them.
     seed : of the campaign, 0 to 2^64 - 1.
+    parts : which dispersion has which numbers and dimensions.
     """
 
     varied: Varied
     distributions: tuple[Distribution, ...]
     plan: Plan
     seed: int
+    parts: Parts
 
     def draw(self, first: int, last: int) -> Drawn:
         """Return the cases first ... last - 1."""
@@ -74,6 +75,17 @@ class Cases:
         values = np.hstack(columns) if columns else np.empty((last - first, 0))
         seeds = words(self.seed, Purpose.NOISE, self.plan.noise_numbers(first, last), 1)[:, 0]
         return Drawn(numbers, values, seeds, weights, self.varied.refusals(values))
+
+    def draw_on(self, known: Drawn, first: int, last: int) -> Drawn:
+        """Return the cases first ... last - 1, of which those up to some number, `known`, are drawn already."""
+        have = len(known.numbers)
+        if first >= have:
+            return self.draw(first, last)
+        names = ("numbers", "values", "seeds", "weights", "refused")
+        kept = [getattr(known, name)[first:last] for name in names]
+        rest = self.draw(max(have, first), max(have, last))
+        *columns, why = ((one, getattr(rest, name)) for one, name in zip(kept, names, strict=True))
+        return Drawn(*map(np.concatenate, columns), refused=why[0] + why[1])
 
 
 def cases_of(
@@ -90,8 +102,7 @@ def cases_of(
     ----------
     mission : what is flown.
     dispersions : what varies; without any, the noise does.
-    plan : a plan, or the name of one: "independent", "latin_hypercube", "sobol", "corners", "one_at_a_time",
-        "grid:LEVELS".
+    plan : a plan, or the name of one: see `casadi_gnc.campaigns.naming`.
     flights : how many there are to be.
     seed : of the campaign.
     scheme : which one flies; the first by default.
@@ -114,29 +125,10 @@ def cases_of(
         except MisfitError as error:
             raise CampaignError(f"the dispersion of {each.key!r}: {error}") from error
     dimensions = max(1, sum(each.dimensions for each in found))
-    made = _plan(plan, dimensions, flights) if isinstance(plan, str) else plan
+    parts = Parts(tuple(each.key for each in dispersions), varied.parameters.keys, tuple(found))
+    made = plan_of(plan, parts, flights) if isinstance(plan, str) else plan
     if made.dimensions != dimensions:
         raise CampaignError(f"the plan has {made.dimensions} dimensions, and the dispersions take {dimensions}")
     if made.cases is not None and flights > made.cases:
         raise CampaignError(f"{flights} flights are asked for, and the plan has {made.cases} cases; ask for those")
-    return Cases(varied, tuple(found), made, seed)
-
-
-#: Names of plans, for messages.
-PLANS = ("independent", "latin_hypercube", "sobol", "corners", "one_at_a_time", "grid:LEVELS")
-
-
-def _plan(name: str, dimensions: int, flights: int) -> Plan:
-    kind, _, levels = name.partition(":")
-    if kind == "grid" and levels.isdecimal():
-        return Grid((int(levels),) * dimensions)
-    made = {
-        "independent": lambda: Independent(dimensions),
-        "latin_hypercube": lambda: LatinHypercube(dimensions, flights),
-        "sobol": lambda: Sobol(dimensions),
-        "corners": lambda: Corners(dimensions),
-        "one_at_a_time": lambda: OneAtATime(dimensions),
-    }
-    if name not in made:
-        raise CampaignError(f"no plan {name!r}; there is {', '.join(PLANS)}")
-    return made[name]()
+    return Cases(varied, tuple(found), made, seed, parts)

@@ -39,6 +39,7 @@ class Purpose(IntEnum):
     LINES = 4
     AUDIT = 5
     NOISE = 6
+    KEPT = 7
 
 
 def check_seed(seed: int) -> int:

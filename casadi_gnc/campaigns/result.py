@@ -6,17 +6,18 @@ import shutil
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from casadi_gnc.campaigns.cases import Cases
-from casadi_gnc.campaigns.store import Columns, Store, read_identity, shards
+from casadi_gnc.campaigns.store import MISSING, SHORT, WHOLE, Columns, Store, read_identity, shards
 from casadi_gnc.campaigns.summary import badness, summarised
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.one_build import fly_case
+from casadi_gnc.missions.one_build import OneBuild, fly_case
 from casadi_gnc.missions.scheme import Metric
 
 
@@ -28,11 +29,19 @@ class Case:
     row: dict[str, Any] = field(repr=False)
     cases: Cases = field(repr=False)
 
-    def fly(self, **options: Any) -> Flight:
-        """Fly the case with its whole record; options as for `casadi_gnc.missions.one_build.fly_case`."""
+    def fly(self, *, build: OneBuild | None = None, **options: Any) -> Flight:
+        """Fly the case with its whole record.
+
+        Parameters
+        ----------
+        build : that flies several cases; one for this case by default.
+        options : as for `casadi_gnc.missions.one_build.fly_case`.
+        """
         drawn = self.cases.draw(self.number, self.number + 1)
         if drawn.refused[0]:
             raise CampaignError(f"case {self.number} is refused: {drawn.refused[0]}")
+        if build is not None:
+            return build.fly_row(drawn.values[0], int(drawn.seeds[0]), **options)
         return fly_case(self.cases.varied, drawn.values[0], int(drawn.seeds[0]), **options)
 
 
@@ -68,12 +77,28 @@ class Campaign:
     @property
     def names(self) -> list[str]:
         """The names of all columns."""
-        return list(self._store.read(self._whole()[0], None))
+        return list(self._store.read(self._readable()[0], None))
 
-    def _whole(self) -> list[int]:
-        found = [number for number, _, _ in shards(self.identity) if self._store.state(number) == "whole"]
+    @cached_property
+    def _states(self) -> dict[int, str]:
+        """The state of each shard when it was first asked for."""
+        return {number: self._store.state(number) for number, _, _ in shards(self.identity)}
+
+    @property
+    def damaged(self) -> list[str]:
+        """A sentence for each shard that cannot be trusted and is left out; running the campaign flies it again."""
+        return [state for state in self._states.values() if state not in (WHOLE, MISSING, SHORT)]
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no case is kept yet."""
+        return not any(state in (WHOLE, SHORT) for state in self._states.values())
+
+    def _readable(self) -> list[int]:
+        found = [number for number, state in self._states.items() if state in (WHOLE, SHORT)]
         if not found:
-            raise CampaignError(f"{str(self.folder)!r} holds no finished shard yet; run the campaign")
+            why = f": {self.damaged[0]}" if self.damaged else ""
+            raise CampaignError(f"{str(self.folder)!r} holds no finished shard yet{why}; run the campaign")
         return found
 
     def column(self, name: str) -> np.ndarray:
@@ -82,7 +107,7 @@ class Campaign:
             known = self.names
             if name not in known:
                 raise CampaignError(f"the table has no column {name!r}; it has {', '.join(known)}")
-            self._kept[name] = np.concatenate([self._store.read(number, [name])[name] for number in self._whole()])
+            self._kept[name] = np.concatenate([self._store.read(number, [name])[name] for number in self._readable()])
         return self._kept[name]
 
     def columns(self, names: Sequence[str]) -> np.ndarray:

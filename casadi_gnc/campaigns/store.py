@@ -7,6 +7,7 @@ campaign.json            identity: mission, scheme, plan, seed, dispersions, cod
 problem.toml, *.py       what the mission was read from, where it was read
 shard-00000.parquet      a row a case, in order (`.npz` without pyarrow)
 shard-00000.json         cases of the shard and the hash of its file; written last, so that it stands for a whole one
+kept/                    whole records of some cases, where they were asked for
 =======================  ==================================================================================
 
 A file is written beside its place, brought to the disk and renamed; whoever is interrupted leaves whole files or none.
@@ -27,6 +28,8 @@ from casadi_gnc.errors import CampaignError
 from casadi_gnc.system.files import prepare_folder, write_beside
 
 IDENTITY = "campaign.json"
+#: States of a shard: as it should be; not flown; without its last cases, for the campaign has grown.
+WHOLE, MISSING, SHORT = "whole", "missing", "short"
 #: A table: columns by name, of one length.
 Columns = dict[str, np.ndarray]
 
@@ -60,17 +63,27 @@ class Store:
         self.identity = identity
         place = folder / IDENTITY
         if place.exists():
-            known = read_identity(folder)
-            apart = [name for name in identity if known.get(name) != identity[name]]
-            if apart:
-                raise CampaignError(
-                    f"{folder} holds another campaign: its {apart[0]} is {_short(known.get(apart[0]))}, and this one's "
-                    f"is {_short(identity[apart[0]])}; give another folder"
-                )
-            self.identity = known
-        else:
+            self.identity = self._grown(read_identity(folder), identity)
+        if not place.exists() or self.identity is identity:
             _put_text(place, json.dumps(identity, indent=2) + "\n")
         self.suffix = self.identity["table"]
+
+    def _grown(self, known: dict[str, Any], asked: dict[str, Any]) -> dict[str, Any]:
+        """Return what the folder is to say: what it says already, or the same with more cases."""
+        apart = [name for name in asked if name != "cases" and known.get(name) != asked[name]]
+        if apart:
+            fixed = apart == ["plan"] and known["plan_name"] == asked["plan_name"] and known["cases"] != asked["cases"]
+            why = "such a plan is made for its number of cases and cannot grow; " if fixed else ""
+            raise CampaignError(
+                f"{self.folder} holds another campaign: its {apart[0]} is {_short(known.get(apart[0]))}, and this "
+                f"one's is {_short(asked[apart[0]])}; {why}give another folder"
+            )
+        if asked["cases"] < known["cases"]:
+            raise CampaignError(
+                f"{self.folder} holds a campaign of {known['cases']} cases, and {asked['cases']} are asked for; "
+                "ask for as many or more, or give another folder"
+            )
+        return known if asked["cases"] == known["cases"] else asked
 
     def place(self, shard: int) -> Path:
         """Return where the table of a shard is."""
@@ -84,17 +97,20 @@ class Store:
         _put_text(place.with_suffix(".json"), json.dumps(entry) + "\n")
 
     def state(self, shard: int) -> str:
-        """Return "whole", "missing", or why the table of a shard cannot be trusted."""
+        """Return `WHOLE`, `MISSING`, `SHORT`, or why the table of a shard cannot be trusted."""
         place = self.place(shard)
         entry = place.with_suffix(".json")
         if not entry.exists():
-            return "missing"
+            return MISSING
         try:
             told = json.loads(entry.read_text(encoding="utf-8"))
-            found = _hash(place)
-        except (OSError, ValueError) as error:
+            found, cases = _hash(place), int(told["cases"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
             return f"{place.name} cannot be read: {error}"
-        return "whole" if told.get("sha256") == found else f"{place.name} is not what was written: its hash differs"
+        if told.get("sha256") != found:
+            return f"{place.name} is not what was written: its hash differs"
+        size = self.identity["shard"]
+        return WHOLE if cases == min(size, self.identity["cases"] - shard * size) else SHORT
 
     def read(self, shard: int, names: list[str] | None = None) -> Columns:
         """Return the columns of a shard, all or those named."""

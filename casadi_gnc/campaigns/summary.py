@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from casadi_gnc.campaigns import statistics
+from casadi_gnc.campaigns.pick_freeze import PickFreeze
 from casadi_gnc.campaigns.statistics import Estimate
 from casadi_gnc.status import StepStatus
 
@@ -35,6 +36,7 @@ def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
         "asked": campaign.identity["cases"],
         "refused": int((~flew).sum()),
         "why": _reasons(campaign),
+        "damaged": campaign.damaged,
         "confidence": confidence,
         "weighted": weighted,
         "representative": campaign.cases.plan.representative,
@@ -46,7 +48,11 @@ def summarised(campaign: Campaign, confidence: float) -> dict[str, Any]:
     if not flew.any():
         return told
     if not campaign.cases.plan.representative:  # chosen cases say what is possible, not how often
-        return told | {"metrics": {one.name: _extremes(campaign, one, flew) for one in campaign.metrics}}
+        for one in campaign.metrics:
+            told["metrics"][one.name] = _extremes(campaign, one, flew)
+            if isinstance(campaign.cases.plan, PickFreeze):
+                told["metrics"][one.name]["sensitivity"] = _sensitivity(campaign, one, confidence)
+        return told
     inputs = campaign.columns(campaign.identity["parameters"])[flew]
     for metric in campaign.metrics:
         told["metrics"][metric.name] = _metric(campaign, metric, flew, inputs, counted, confidence)
@@ -96,6 +102,23 @@ def _extremes(campaign: Campaign, metric: Metric, flew: np.ndarray) -> dict[str,
     return told | {"percentiles": {}, "worst": _worst(campaign, metric, flew)}
 
 
+def _sensitivity(campaign: Campaign, metric: Metric, confidence: float) -> list[dict[str, Any]] | None:
+    """Return both indices of each input from the blocks that are whole, strongest first; None where a value lacks."""
+    plan, numbers = campaign.cases.plan, campaign.column("case")
+    assert isinstance(plan, PickFreeze)
+    blocks, counts = np.unique(numbers // plan.block, return_counts=True)
+    whole = np.isin(numbers // plan.block, blocks[counts == plan.block])
+    values = campaign.column(f"metric.{metric.name}")[whole]
+    if len(values) < 2 * plan.block or not np.isfinite(values).all() or (values == values[0]).all():
+        return None
+    found = statistics.indices(values, len(plan.groups), confidence)
+    told = [
+        {"key": name, "first_order": _plain(first), "total": _plain(total)}
+        for (name, _), first, total in zip(campaign.cases.parts.groups, found.first, found.total, strict=True)
+    ]
+    return sorted(told, key=lambda each: -(each["total"]["value"] or 0.0))
+
+
 def _worst(campaign: Campaign, metric: Metric, flew: np.ndarray) -> list[dict[str, Any]]:
     values = campaign.column(f"metric.{metric.name}")[flew]
     order = np.argsort(-badness(metric, values), kind="stable")[:_WORST]
@@ -110,13 +133,17 @@ def _requirement(campaign: Campaign, one: Requirement, flew: np.ndarray, weights
     told |= {"met_by": int(met.sum()), "of": len(met)}
     told["worst"] = {"case": int(campaign.column("case")[flew][worst]), "margin": _number(float(margins[worst]))}
     if weights is None:
+        shown = statistics.share_bounds(int(met.sum()), len(met), one.confidence)
+    else:
+        shown = statistics.weighted_share(met, weights, one.confidence)
+    told["shown"] = _plain(shown)
+    if one.share == 1.0:  # one flight that fails decides; no number of flights shows that every one passes
+        return told | {"verdict": "undecided" if met.all() else "not met", "more_if_all_pass": None}
+    if weights is None:
         found = statistics.judge(int(met.sum()), len(met), one.share, one.confidence)
         told |= {"verdict": str(found.verdict), "shown": _plain(found.share)}
-        told |= {"more_if_all_pass": found.more_if_all_pass, "more_at_this_rate": found.more_at_this_rate}
-        return told
-    shown = statistics.weighted_share(met, weights, one.confidence)
-    verdict = "met" if shown.low >= one.share else "not met" if shown.high < one.share else "undecided"
-    return told | {"verdict": verdict, "shown": _plain(shown)}
+        return told | {"more_if_all_pass": found.more_if_all_pass, "more_at_this_rate": found.more_at_this_rate}
+    return told | {"verdict": "met" if shown.low >= one.share else "not met" if shown.high < one.share else "undecided"}
 
 
 def _drivers(campaign: Campaign, inputs: np.ndarray, output: np.ndarray, confidence: float) -> list[dict[str, Any]]:

@@ -2,25 +2,42 @@
 
 from __future__ import annotations
 
+from enum import Enum
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casadi_gnc.cli.campaign_summary import print_summary
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.result import Campaign
 
 
+class Ending(str, Enum):
+    """Kinds of pictures."""
+
+    png = "png"
+    svg = "svg"
+    pdf = "pdf"
+
+
 def campaign(
     problem: Annotated[str, typer.Argument(help='A problem file, a shipped one\'s name; or "show" and a folder.')],
     folder: Annotated[Path | None, typer.Argument(help='After "show": folder of a campaign.')] = None,
-    flights: Annotated[int | None, typer.Option(min=1, help="Number of cases; 1000 if left out.")] = None,
+    flights: Annotated[
+        int | None, typer.Option(min=1, help="Number of cases; 1000 if left out. More than a folder has: goes on.")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the rows; out/<mission>-campaign if left out.")] = None,
     scheme: Annotated[str | None, typer.Option(help="Which scheme flies; the first if left out.")] = None,
     plan: Annotated[
-        str, typer.Option(help="independent, latin_hypercube, sobol, corners, one_at_a_time or grid:LEVELS.")
+        str,
+        typer.Option(
+            help="independent, latin_hypercube, sobol, corners, one_at_a_time, grid:LEVELS, pick_freeze (sensitivity "
+            "indices) or importance:SHIFT:KEY=PART,... (rare events along a direction)."
+        ),
     ] = "independent",
     seed: Annotated[int, typer.Option(min=0, help="Of the cases and their noise.")] = 0,
     engine: Annotated[
@@ -31,6 +48,11 @@ def campaign(
     ] = None,
     shard: Annotated[str, typer.Option(help="i/n: only the i-th of n parts; machines may share a folder.")] = "1/1",
     audit: Annotated[int, typer.Option(min=0, help="Cases of each shard flown again in scalar C.")] = 3,
+    keep: Annotated[
+        str | None, typer.Option(help="Whole records to keep, such as worst:20,failed:50,random:10.")
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Draw what the flights say into this folder.")] = None,
+    picture_format: Annotated[Ending, typer.Option("--format", help="Of the pictures.")] = Ending.png,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
     confidence: Annotated[float, typer.Option(help="Of the bounds that are told.")] = 0.9,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
@@ -41,16 +63,17 @@ def campaign(
 
     casadi-gnc campaign mission.toml --flights 10000 --out mc/
 
-    casadi-gnc campaign show mc/ --json
+    casadi-gnc campaign show mc/ --pictures mc/pictures
     """
     from casadi_gnc.campaigns.campaign import parts_of
+    from casadi_gnc.campaigns.keeping import FOLDER, Keep
     from casadi_gnc.errors import CampaignError
     from casadi_gnc.problem_files import by_name
 
     if problem == "show":
         if folder is None:
             raise CampaignError("which campaign? give its folder: casadi-gnc campaign show FOLDER")
-        _print(by_name.open_campaign(folder), confidence, json)
+        _tell(by_name.open_campaign(folder), confidence, json, pictures, picture_format)
         return
     if folder is not None:
         raise CampaignError(f"what is {str(folder)!r}? the folder of a campaign is given as --out {folder}")
@@ -72,78 +95,28 @@ def campaign(
             engine=engine,
             scheduler=scheduler,
             threads=threads,
+            keep=None if keep is None else Keep.of(keep),
             told=told,
             said=said,
         )
-    _print(made, confidence, json)
-
-
-def _print(found: Campaign, confidence: float, json: bool) -> None:
-    import json as text
-
-    summary = found.summary(confidence)
-    if json:
-        typer.echo(text.dumps(summary, indent=2, allow_nan=False))
+    if made.is_empty and not json:
+        files = -(-made.identity["cases"] // made.identity["shard"])
+        typer.echo(f"part {shard} has no cases: the campaign is {'one file' if files == 1 else f'{files} files'}")
         return
-    from rich.console import Console
-    from rich.markup import escape
-    from rich.table import Table
-
-    console = Console(soft_wrap=True)
-
-    def say(sentence: str) -> None:
-        console.print(sentence, highlight=False, markup=False)
-
-    flew = summary["cases"] - summary["refused"]
-    say(f"{summary['mission']}, {summary['scheme']}: {flew} flights of {summary['asked']} cases")
-    for why, count in summary["why"].items():
-        say(f"{count} cases refused: {why}")
-    title = f"what a share of all flights stays within, with bounds that hold at {100 * confidence:g} %"
-    table = Table(title=title, title_justify="left")
-    for name in ("", "share", "within", "bounds"):
-        table.add_column(name, justify="left" if name in ("", "bounds") else "right")
-    for name, one in summary["metrics"].items():
-        unit = f" [{one['unit']}]" if one["unit"] not in ("", "-") else ""
-        if one.get("range"):
-            table.add_row(escape(name.replace("_", " ") + unit), "all", "", "{:.4g} to {:.4g}".format(*one["range"]))
-        for number, (share, found_one) in enumerate(one["percentiles"].items()):
-            value, low, high = (_shown(found_one[part]) for part in ("value", "low", "high"))
-            first = escape(name.replace("_", " ") + unit) if number == 0 else ""
-            table.add_row(first, f"{share} %", value, f"{low} to {high}")
-        table.add_section()
-    if summary["metrics"]:
-        console.print(table, soft_wrap=False)
-    for name, one in summary["metrics"].items():
-        if one["without"]:
-            say(f"{one['without']} flights have no {name.replace('_', ' ')}, which counts as the worst")
-    for name, one in summary["requirements"].items():
-        shown = one["shown"]
-        bounds = f"{_percent(shown['low'])} to {_percent(shown['high'])}"
-        more = one.get("more_if_all_pass")
-        todo = f"; {more} more flights that all pass would meet it" if one["verdict"] == "undecided" and more else ""
-        say(
-            f"{name}: {one['verdict']}: {one['asked']} in {one['met_by']} of {one['of']} flights, {bounds} of all, "
-            f"asked of {_percent(one['share'])} with {_percent(one['confidence'])} confidence{todo}"
-        )
-    for one in summary["statuses"].values():
-        share = one["share"]
-        low, high = 100 * share["low"], 100 * share["high"]
-        say(f"{one['flights']} flights ({low:.3g} to {high:.3g} % of all): {one['sentence']}")
-    for name, one in summary["metrics"].items():
-        drivers = [each for each in one.get("drivers", []) if abs(each["rank_correlation"]["value"]) >= 0.1][:3]
-        if drivers:
-            told = ", ".join(f"{each['key']} ({each['rank_correlation']['value']:+.2f})" for each in drivers)
-            say(f"{name.replace('_', ' ')} goes with {told}")
-    worst = [f"{name} of case {one['worst'][0]['case']}" for name, one in summary["metrics"].items()]
-    if worst:
-        say(f"the worst: {', '.join(worst)}")
-    say(f"kept in {found.folder}; a case again: casadi-gnc fly {found.folder} --case worst:METRIC")
+    _tell(made, confidence, json, pictures, picture_format)
+    if keep is not None and (made.folder / FOLDER).exists():
+        count = len(list((made.folder / FOLDER).glob("*.npz")))
+        typer.echo(f"kept {count} whole records in {made.folder / FOLDER}", err=json)
 
 
-def _percent(share: float | None) -> str:
-    return "?" if share is None else f"{100 * share:.6g} %"
+def _tell(made: Campaign, confidence: float, json: bool, pictures: Path | None, ending: Ending) -> None:
+    """Print what a campaign says, and draw it where that is asked for."""
+    if not json:
+        print_summary(made, confidence)
+    else:
+        typer.echo(dumps(made.summary(confidence), indent=2, allow_nan=False))
+    if pictures is not None:
+        from casadi_gnc.reports.campaign_gallery import draw_campaign
 
-
-def _shown(value: float | None) -> str:
-    """Return a number; what has no value, or no bound, is beyond all numbers."""
-    return "none" if value is None else f"{value:.4g}"
+        drawn = draw_campaign(made, pictures, confidence=confidence, ending=ending.value)
+        typer.echo(f"drew {len(drawn)} pictures into {pictures}", err=json)

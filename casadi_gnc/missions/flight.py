@@ -174,9 +174,12 @@ class Flight:
 
     def save(self, folder: Path) -> Path:
         """Write the signals as `<scheme>.npz` (with units under `unit_<name>`); return its path."""
+        return self.save_as(folder / f"{self.scheme}.npz")
+
+    def save_as(self, target: Path) -> Path:
+        """Write the signals as a file of another name; else as `save`."""
         arrays: dict[str, Any] = dict(self.signals)
         arrays.update({f"unit_{name}": np.array(self.unit(name)) for name in self.layout.names})
-        target = folder / f"{self.scheme}.npz"
         write_beside(target, lambda path: np.savez_compressed(path, **arrays))
         return target
 

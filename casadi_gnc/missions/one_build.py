@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,13 @@ from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.flying import EngineName, Progress, begin, engine_of, flown
+from casadi_gnc.missions.judging import judges_of
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.parameters import Varied
+from casadi_gnc.missions.requirements import Judge
+
+#: Samples of which every one is looked at at once.
+_CHUNK = 50_000
 
 
 class OneBuild:
@@ -101,7 +107,7 @@ class OneBuild:
         mission = replace(
             varied.mission, noise=replace(varied.mission.noise, seed=seed), parts=varied.mission.parts_asked
         )
-        runner = self._runner(mission)
+        runner = self._runner(mission, seed)
         carried = begin(mission, varied.tapes, runner, np.array(row, dtype=float))
         every = mission.timing.record_every if decimation is None else decimation
         known = told_of or varied.nominal
@@ -109,14 +115,36 @@ class OneBuild:
             mission, mission.schemes[0], varied.tapes, runner, carried, every, self._maths, self._notes, progress, known
         )
 
-    def _runner(self, mission: Mission) -> Any:
+    def judge(self, row: Sequence[float] | np.ndarray, seed: int) -> tuple[np.ndarray, dict[str, float]]:
+        """Return the tally of a flight, and the robustness of each requirement that it cannot carry, by id.
+
+        No record is kept, and nothing else is told. Arguments as for `fly_row`.
+        """
+        mission, tapes = self.varied.mission, self.varied.tapes
+        runner = self._runner(mission, seed)
+        carried = begin(mission, tapes, runner, np.array(row, dtype=float))
+        total, done = mission.timing.samples, 0
+        for judge in self._judges:
+            judge.forget()
+        while done < total:
+            every = np.zeros((min(_CHUNK, total - done), tapes.row.size))
+            done += runner.run(carried, done, len(every), 1, every)
+            for judge in self._judges:
+                judge.take(every)
+        return carried.tally, {judge.requirement.id: judge.verdict().robustness for judge in self._judges}
+
+    @cached_property
+    def _judges(self) -> list[Judge]:
+        return judges_of(self.varied.mission, self.varied.tapes)
+
+    def _runner(self, mission: Mission, seed: int) -> Any:
         """Return the engine: the compiled one is made once, and given the seed of each flight."""
         if self._made is None:
             made, self._notes = engine_of(mission, mission.schemes[0], self.varied.tapes, self._engine, self._maths)
             if not isinstance(made, CompiledEngine):
                 return made
             self._made = made
-        self._made.reseed(mission.noise.seed)
+        self._made.reseed(seed)
         return self._made
 
 

@@ -135,7 +135,7 @@ def open_campaign(folder: str | Path) -> Campaign:
     CampaignError
         For a folder without campaign, or one of a mission that was made from objects, whose code is not in the folder.
     """
-    from casadi_gnc.campaigns.campaign import opened
+    from casadi_gnc.campaigns.identity import opened
     from casadi_gnc.campaigns.store import read_identity
 
     place = Path(folder)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import hashlib
 import json
 import math
@@ -202,18 +203,88 @@ def test_requirements_of_many_flights_are_judged_by_their_share():
 
 def test_a_corrupt_shard_is_flown_again(tmp_path, monkeypatch):
     monkeypatch.setattr("casadi_gnc.campaigns.campaign._SHARD_SAMPLES", 400 * 16)
-    flown(out=tmp_path)
+    found = flown(out=tmp_path)
     kept = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     second = next(path for path in tmp_path.iterdir() if path.name.startswith("shard-00001") and path.suffix != ".json")
     second.write_bytes(kept[second.name][:-40] + bytes(40))
     (tmp_path / "shard-00002.json").unlink()
-    flown(out=tmp_path)
+    damaged = casadi_gnc.campaigns.result.Campaign(tmp_path, found.cases)
+    assert len(damaged) == 100 - 2 * 16
+    assert damaged.summary()["damaged"] == [f"{second.name} is not what was written: its hash differs"]
+    told = []
+    flown(out=tmp_path, said=told.append)
+    assert told[:1] == [f"{second.name} is not what was written: its hash differs; it is flown again"]
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == kept
+
+
+@pytest.mark.parametrize("plan", ["independent", "sobol"])
+def test_a_campaign_grows_to_what_one_of_more_flights_is(tmp_path, monkeypatch, plan):
+    monkeypatch.setattr("casadi_gnc.campaigns.campaign._SHARD_SAMPLES", 400 * 32)
+    flown(out=tmp_path / "grown", flights=40, plan=plan)
+    flown(out=tmp_path / "grown", flights=100, plan=plan)
+    flown(out=tmp_path / "at_once", flights=100, plan=plan)
+    assert tables(tmp_path / "grown") == tables(tmp_path / "at_once")
+    with pytest.raises(CampaignError, match="holds a campaign of 100 cases, and 40 are asked for; ask for as many"):
+        flown(out=tmp_path / "grown", flights=40, plan=plan)
+
+
+def test_a_plan_of_fixed_size_does_not_grow(tmp_path):
+    flown(out=tmp_path, flights=40, plan="latin_hypercube")
+    with pytest.raises(CampaignError, match="is made for its number of cases and cannot grow; give another folder"):
+        flown(out=tmp_path, flights=41, plan="latin_hypercube")
+
+
+def test_a_full_disk_is_told_and_loses_nothing(tmp_path, monkeypatch):
+    """The third write finds no room: two shards are kept, and the same campaign goes on to the same bytes."""
+    from casadi_gnc.campaigns import store
+
+    monkeypatch.setattr("casadi_gnc.campaigns.campaign._SHARD_SAMPLES", 400 * 16)
+    calm, write, count = tmp_path / "calm", store._write, []
+    flown(out=calm)
+
+    def full(place, columns, suffix):
+        count.append(place)
+        if len(count) == 3:
+            write(place, columns, suffix)
+            raise OSError(errno.ENOSPC, "No space left on device", str(place))
+        write(place, columns, suffix)
+
+    monkeypatch.setattr(store, "_write", full)
+    with pytest.raises(CampaignError, match="cannot write to .*: No space left on device; what is finished is kept"):
+        flown(out=tmp_path / "full")
+    assert sorted(path.name for path in (tmp_path / "full").glob("shard-*.json")) == [
+        "shard-00000.json",
+        "shard-00001.json",
+    ]
+    flown(out=tmp_path / "full")
+    assert tables(tmp_path / "full") == tables(calm)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+def test_a_file_that_may_not_grow_is_told_in_one_sentence(problem, tmp_path):
+    """The kernel cuts every file at 16 KiB, as a full disk would: exit 2, a sentence, nothing half."""
+    limit = "import resource, signal, os, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)"
+    limit += "; resource.setrlimit(resource.RLIMIT_FSIZE, (16384, 16384)); os.execv(sys.argv[1], sys.argv[1:])"
+    arguments = ("campaign", problem, "--flights", 400, "--scheme", "observer_pinv", "--out", tmp_path / "mc")
+    assert run(*arguments[:-1], tmp_path / "calm").returncode == 0  # and what it compiled is at hand
+    none = run(*arguments[:-1], tmp_path / "part", "--shard", "2/2")
+    assert (none.returncode, none.stdout) == (0, "part 2/2 has no cases: the campaign is one file\n")
+    done = subprocess.run(
+        [sys.executable, "-c", limit, *command(*arguments)], capture_output=True, text=True, timeout=300
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.strip().splitlines()
+    assert "cannot write to" in line
+    assert "File too large; what is finished is kept" in line
+    assert not list((tmp_path / "mc").glob("shard-*"))
+    assert run(*arguments).returncode == 0
+    assert tables(tmp_path / "mc") == tables(tmp_path / "calm")
 
 
 def test_another_campaign_never_mixes_into_a_folder(tmp_path):
     flown(out=tmp_path)
-    for change in ({"seed": 1}, {"plan": "sobol"}, {"dispersions": [INERTIA]}, {"samples": 300}, {"flights": 101}):
+    for change in ({"seed": 1}, {"plan": "sobol"}, {"dispersions": [INERTIA]}, {"samples": 300}):
         with pytest.raises(CampaignError, match="holds another campaign: its .* give another folder"):
             flown(out=tmp_path, **change)
 

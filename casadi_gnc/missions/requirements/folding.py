@@ -112,6 +112,10 @@ class Judge:
         self._bound = self.requirement.bind(self.row, column, self.period)
         self._margins = margins_of(self._bound, self.row, column)
 
+    def forget(self) -> None:
+        """Forget all samples, for another flight."""
+        self._taken.clear()
+
     def take(self, rows: np.ndarray) -> None:
         """Note the next samples, (K, columns)."""
         self._taken.append(self._margins(rows))
