@@ -274,11 +274,11 @@ class SloshMasses(Component):
 
     def moment(self, own: Any) -> Any:
         """Return the sum of m r."""
-        return sum((mass * place for mass, place in self._places(own)), ca.SX.zeros(3))
+        return sum((mass * place for mass, place in self._places(own)), ca.DM.zeros(3))
 
     def inertia(self, own: Any) -> Any:
         """Return the sum of their inertias as points."""
-        return sum((about_origin(mass, place) for mass, place in self._places(own)), ca.SX.zeros(3, 3))
+        return sum((about_origin(mass, place) for mass, place in self._places(own)), ca.DM.zeros(3, 3))
 
     def couplings(self, own: Any) -> tuple[Any, Any, Any]:
         """Return m a, m r x a, m."""

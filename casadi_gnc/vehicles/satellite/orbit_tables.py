@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mechanics.circular_orbit import EARTH_MU, EARTH_RADIUS
@@ -18,6 +18,9 @@ from casadi_gnc.tables.disturbances import HarmonicTorque
 from casadi_gnc.tables.part import MisfitError, Part, Positive, Vector
 
 from .attitude_tables import DEGREE
+
+#: Height [m] below which no orbit lasts a revolution.
+_LOWEST = 100e3
 
 
 class OrbitTable(Part):
@@ -41,15 +44,20 @@ class OrbitTable(Part):
             raise ValueError("give either altitude_m or semi_major_axis_m")
         if self.altitude_m is not None and self.eccentricity:
             raise MisfitError("an altitude is of a circular orbit; give semi_major_axis_m", "eccentricity")
-        if self.lowest() <= EARTH_RADIUS:
-            told = f"the orbit comes down to {(self.lowest() - EARTH_RADIUS) / 1e3:.0f} km"
-            raise ValueError(f"{told} below the Earth's equatorial radius; lengths are in metres")
-        if self.epoch is not None:
-            try:
-                Epoch.of(self.epoch)
-            except FlightError as error:
-                raise MisfitError(str(error), "epoch") from None
+        if self.lowest() < EARTH_RADIUS + _LOWEST:
+            told = f"the orbit comes down to {(self.lowest() - EARTH_RADIUS) / 1e3:.3g} km above the equatorial radius"
+            raise ValueError(f"{told}, expected at least {_LOWEST / 1e3:.0f} km; lengths are in metres")
         return self
+
+    @field_validator("epoch")
+    @classmethod
+    def _is_a_date(cls, value: str | None) -> str | None:
+        if value is not None:
+            try:
+                Epoch.of(value)
+            except FlightError as error:
+                raise ValueError(str(error)) from None
+        return value
 
     def _axis(self) -> Any:
         return self.semi_major_axis_m if self.altitude_m is None else EARTH_RADIUS + self.altitude_m
