@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
-EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+EXAMPLES = [
+    path if path.stem in ("fly_and_look", "linearise_and_tune") else pytest.param(path, marks=pytest.mark.slow)
+    for path in sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+]
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
@@ -15,3 +18,5 @@ def test_example_runs(example, tmp_path):
     done = subprocess.run([sys.executable, str(example)], capture_output=True, text=True, cwd=tmp_path, timeout=300)
     assert done.returncode == 0, done.stderr
     assert done.stdout
+    pictures = [path.suffix for path in tmp_path.iterdir() if path.suffix == ".png"]
+    assert len(pictures) == example.read_text().count("savefig(")
