@@ -1,4 +1,4 @@
-"""A thousand dispersed de-tumblings held against a requirement: how many meet it, how sure that is, and the worst one again.
+"""A thousand dispersed de-tumblings held against a requirement: how many meet it, how surely, and the worst one again.
 
 Inertia and start differ from case to case. One build serves them all, and each has the words of a single flight, so
 the worst is flown again bit for bit, with its whole record. In a file: docs/campaigns.md, docs/requirements.md.

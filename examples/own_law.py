@@ -1,7 +1,7 @@
 """A law of your own in twenty lines, flown beside a shipped one, checked, and handed over as C.
 
-The law is a proportional and derivative one with an integral, for the captured craft on twelve thrusters. From its text come the
-flight, the checks of its sampled poles, and the package (docs/first_law.md goes on from here).
+The law is a proportional and derivative one with an integral, for the captured craft on twelve thrusters. From its text
+come the flight, the checks of its sampled poles, and the package (docs/first_law.md goes on from here).
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ class Pid(gnc.Law):
         return -self.attitude_gain * now.mrp - self.rate_gain * now.rate - self.integral_gain * m
 
     def rate(self, t, y, m, wanted, achieved):
-        # Where the thrusters cannot follow, what is missing unloads the sum; with the other sign `check` fails, and so does
-        # the flight.
+        # Where the thrusters cannot follow, what is missing unloads the sum; with the other sign `check` fails, and so
+        # does the flight.
         return self.inputs.split(y).mrp + (wanted - achieved) / self.attitude_gain
 
 

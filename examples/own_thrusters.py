@@ -1,7 +1,7 @@
-"""Thrusters of your own: what they can make, a turn of the commanded torque about an axis, and proof that it is the best.
+"""Thrusters of your own: forces for a torque that turns about an axis, and proof that they are the best.
 
-Eight thrusters sit in pairs on the corners of a box; each pushes one way, and the centre of mass is known to 4 mm only. The same
-problem can stand in a file (docs/allocation.md) and be used by `casadi-gnc allocate` and `attainable`.
+Eight thrusters sit in pairs on the corners of a box; each pushes one way, and the centre of mass is known to 4 mm only.
+The same problem can stand in a file (docs/allocation.md) and be used by `casadi-gnc allocate` and `attainable`.
 """
 
 import numpy as np
