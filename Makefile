@@ -14,6 +14,7 @@
 # make bench    every solver that is installed, on the shipped sets; report in out/bench/allocation
 # make ratios   every time and ratio that the documentation quotes, into docs/ratios.md
 # make docs     the documentation as a site, in docs/_build
+# make browser  the browser files of the report from the npm registry, into codegen/report/vendor; needs node and npm
 #
 # Needed beforehand: python3 (3.11 or newer, with venv), gcc with the headers of the C library, and make. Packages come
 # from the two lock files, each with its hash.
@@ -22,7 +23,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 OUT ?= out
 
-.PHONY: demo test test-all test-rest test-long test-oldest lock bench ratios gates targets pictures lint docs clean
+BROWSER := codegen/report/vendor
+
+.PHONY: demo test test-all test-rest test-long test-oldest lock bench ratios gates targets pictures lint docs browser clean
 
 # One BLAS thread a process: two processes share the cores.
 PYTEST := -m pytest -q -n 2
@@ -86,6 +89,13 @@ gates:
 
 docs: .venv/installed-dev
 	$(BIN)/sphinx-build -W -q docs docs/_build
+
+# In a folder of its own, so that what npm installs stays out of the package.
+browser:
+	rm -rf .browser && mkdir .browser
+	cp $(BROWSER)/package.json $(BROWSER)/package-lock.json $(BROWSER)/three_used.js $(BROWSER)/build.mjs .browser
+	cd .browser && npm ci --silent --no-audit --no-fund && node build.mjs $(abspath $(BROWSER))
+	rm -rf .browser
 
 PIP := -m pip --quiet --disable-pip-version-check install
 

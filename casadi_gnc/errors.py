@@ -108,3 +108,7 @@ class PackageError(GncError):
 
 class TargetError(GncError):
     """Report a target that is not known, lacks its tools, or did not run the program."""
+
+
+class ReportError(GncError):
+    """Report what no page can be made of."""

@@ -47,26 +47,32 @@ def fly(
         str | None, typer.Option(help="Of a campaign's folder: a number, worst:METRIC, median:METRIC, failed:ID.")
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
+    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
-    """Fly a mission and write <scheme>.npz, summary.json and pictures; of one with sweeps summary.json alone."""
-    from casadi_gnc.missions import flight as results
+    """Fly a mission and write <scheme>.npz, summary.json, mission.json and pictures; of sweeps summary.json alone."""
+    from casadi_gnc.errors import ReportError
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.problem_files.sweeping import load_sweeps
+    from casadi_gnc.reports.style import check_page
     from casadi_gnc.system.files import prepare_folder
 
+    if report is not None:
+        check_page(report)
     if case is not None:
-        _fly_case(Path(problem), case, out, decimation, plots, json)
+        _fly_case(Path(problem), case, out, decimation, plots, json, report)
         return
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)
     if sweeps := load_sweeps(problem):
+        if report is not None:
+            raise ReportError("a mission with sweeps keeps no records to draw; fly it without --report")
         options = {"engine": engine, "maths": math.value, "mode": mode.value if mode else None}
         _fly_sweeps(mission, sweeps, list(dict.fromkeys(chosen)), folder, json, options)
         return
-    flights, written = [], []
+    flights: list[Flight] = []
     _warn(mission, chosen, mode)
     for name in dict.fromkeys(chosen):
         with Progress(name, quiet=json) as progress:
@@ -76,21 +82,42 @@ def fly(
                     decimation=decimation, progress=progress,
                 )
             )  # fmt: skip
-        written.append(flights[-1].save(folder))
-    written.append(results.save_summary(folder, flights))
-    if plots:
-        written += _draw(mission, flights, folder)
+        flights[-1].save(folder)
+    written = _keep(mission.with_timing(mode=mode.value) if mode else mission, flights, folder, plots, report)
     if json:
         typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
     else:
-        _print(mission, flights, written)
+        _print(mission, flights, written, report)
     if any(flight.diverged for flight in flights):
         raise typer.Exit(1)
 
 
-def _fly_case(campaign: Path, case: str, out: Path | None, decimation: int | None, plots: bool, json: bool) -> None:
+def _keep(mission: Mission, flights: list[Flight], folder: Path, plots: bool, report: Path | None) -> list[Path]:
+    """Write what is kept of flights beside their records, and return all paths."""
+    from casadi_gnc.missions.flight import save_summary
+    from casadi_gnc.reports import describing
+
+    written = [folder / f"{flight.scheme}.npz" for flight in flights]
+    written += [save_summary(folder, flights), describing.save(folder, mission, [one.scheme for one in flights])]
+    if plots:
+        written += _draw(mission, flights, folder)
+    if report is not None:
+        from casadi_gnc.reports import flight_page
+
+        flight_page.of_mission(mission, flights, report)
+    return written
+
+
+def _fly_case(
+    campaign: Path,
+    case: str,
+    out: Path | None,
+    decimation: int | None,
+    plots: bool,
+    json: bool,
+    report: Path | None,
+) -> None:
     """Fly one case of a campaign again, word for word, and write it as any flight."""
-    from casadi_gnc.missions import flight as results
     from casadi_gnc.problem_files.by_name import open_campaign
     from casadi_gnc.system.files import prepare_folder
 
@@ -99,14 +126,13 @@ def _fly_case(campaign: Path, case: str, out: Path | None, decimation: int | Non
     folder = prepare_folder(Path("out") / f"{mission.name}-case-{found.number}" if out is None else out)
     with Progress(f"case {found.number}", quiet=json) as progress:
         flight = found.fly(decimation=decimation, progress=progress)
-    written = [flight.save(folder), results.save_summary(folder, [flight])]
-    if plots:
-        written += _draw(mission, [flight], folder)
+    flight.save(folder)
+    written = _keep(mission, [flight], folder, plots, report)
     if json:
         typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
     else:
         typer.echo(f"case {found.number}")
-        _print(mission, [flight], written)
+        _print(mission, [flight], written, report)
     if flight.diverged:
         raise typer.Exit(1)
 
@@ -165,7 +191,7 @@ def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
     return pictures
 
 
-def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None:
+def _print(mission: Mission, flights: list[Flight], written: list[Path], report: Path | None) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -197,6 +223,8 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path]) -> None
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
     names = ", ".join(path.name for path in written)
     console.print(f"wrote to {written[0].parent}: {names}", highlight=False, markup=False)
+    if report is not None:
+        console.print(f"wrote {report}", highlight=False, markup=False)
 
 
 def _judged(mission: Mission, flights: list[Flight]) -> Any:

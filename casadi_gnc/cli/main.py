@@ -23,6 +23,7 @@ from casadi_gnc.cli import (
     generate,
     new,
     problems,
+    report,
     reproduce,
     schema,
     synthesize,
@@ -65,6 +66,7 @@ app.command("attainable")(_about_its_file(attainable.attainable))
 app.command("synthesize")(synthesize.synthesize)
 app.command("generate")(_about_its_file(generate.generate))
 app.command("verify")(verify.verify)
+app.command("report")(report.report)
 app.add_typer(bench.app, name="bench")
 app.add_typer(problems.app, name="problems")
 app.command("reproduce")(reproduce.reproduce)

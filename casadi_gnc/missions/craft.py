@@ -21,6 +21,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.describing import shortened
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.plant import Plant
+from casadi_gnc.missions.scene import Scene
 from casadi_gnc.navigation import Navigation
 from casadi_gnc.registry import Registry
 from casadi_gnc.tables.allocation import Pinv, Robust
@@ -119,6 +120,10 @@ class Craft(Part):
         others = [name for name in plant.inputs.names if name not in effort]
         told = [Panel("actuators", name, name.replace("_", " ")) for name in others]
         return (*seen, *made, *told)
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return what the report's picture in space shows: what the kinds of the plant's signals tell."""
+        return Scene.of(mission.truth.state)
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterable[Check]:
         """Yield what only this craft can say of a mission before it flies."""

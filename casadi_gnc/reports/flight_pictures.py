@@ -17,6 +17,7 @@ from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.reports.style import COLOURS, FONT, legend, rows, save
+from casadi_gnc.reports.thinning import kept
 from casadi_gnc.system.text import picture
 
 #: Points drawn of a signal; more are thinned to the envelope's extremes.
@@ -96,15 +97,8 @@ def _thresholds(mission: Mission, signal: str) -> list[float]:
 
 
 def _thin(time: np.ndarray, signal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return at most `_POINTS` points that keep every extreme of each short stretch."""
-    stretch = -(-len(time) // (_POINTS // 2))
-    if stretch <= 2:
-        return time, signal
-    whole = len(time) // stretch * stretch
-    blocks = signal[:whole].reshape(-1, stretch)
-    first = np.arange(len(blocks)) * stretch
-    picked = np.sort(np.concatenate([first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)]))
-    picked = np.unique(np.concatenate([picked, [len(time) - 1]]))
+    """Return at most about `_POINTS` points that keep every extreme of each short stretch."""
+    picked = kept(signal[:, None], _POINTS // 2)
     return time[picked], signal[picked]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import ProblemError, ReportError
 from casadi_gnc.system.files import write_beside
 
 #: Okabe and Ito's colours, told apart with every kind of colour vision.
@@ -47,6 +47,12 @@ def check_ending(target: Path) -> None:
     """Raise `ProblemError` for an ending that is no picture's."""
     if target.suffix not in (".png", ".svg", ".pdf"):
         raise ProblemError(f"{target.name} has the ending {target.suffix!r}; a picture ends in .png, .svg or .pdf")
+
+
+def check_page(target: Path) -> None:
+    """Raise `ReportError` for an ending that is no page's."""
+    if target.suffix not in (".html", ".htm"):
+        raise ReportError(f"{target.name} has the ending {target.suffix!r}; a report ends in .html")
 
 
 def save(figure: Any, target: Path) -> Path:

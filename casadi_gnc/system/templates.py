@@ -25,8 +25,9 @@ def _as_markup(value: Any) -> Any:
 @cache
 def environment(markup: bool = False) -> jinja2.Environment:
     """Return the templates; `markup` for those that are XML or HTML."""
+    codegen = assets.folder("codegen")
     made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(assets.folder("codegen") / "templates"),
+        loader=jinja2.FileSystemLoader([codegen / "templates", codegen / "report"]),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         autoescape=markup,

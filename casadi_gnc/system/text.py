@@ -7,8 +7,10 @@ reader's eye or a parser about (`refused`) are written out, as `<U+202E>`; probl
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
+from collections.abc import Mapping
 
 #: C0 but tab and newline, DEL, C1; line and paragraph separators; overrides, embeddings and isolates of the direction
 #: of writing; interlinear annotation; the byte order mark; tags; halves of surrogate pairs; what is no character.
@@ -105,6 +107,28 @@ def xml(text: object) -> str:
     """
     said = visible(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     return said.replace('"', "&#34;").replace("'", "&#39;").replace("\n", "&#10;").replace("\t", "&#9;")
+
+
+def json_in_html(content: object) -> str:
+    r"""Return plain data as JSON that may stand in an element of HTML: nothing in it ends the element.
+
+    Texts in it are read back as `visible(text)`, names of tables too. Raises `ValueError` for a number that JSON lacks.
+
+    Examples
+    --------
+    >>> print(json_in_html(["</script>", "a" + chr(0x202E)]))
+    ["\u003c/script\u003e","a\u003cU+202E\u003e"]
+    """
+    said = json.dumps(_all_visible(content), allow_nan=False, separators=(",", ":"))
+    return said.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _all_visible(content: object) -> object:
+    if isinstance(content, str):
+        return visible(content)
+    if isinstance(content, Mapping):
+        return {visible(key): _all_visible(each) for key, each in content.items()}
+    return [_all_visible(each) for each in content] if isinstance(content, (list, tuple)) else content
 
 
 def markdown(text: object) -> str:

@@ -59,7 +59,7 @@ def test_fly_writes_signals_summary_and_pictures(problem, tmp_path):
     assert done.returncode == 0, done.stderr
     names = {path.name for path in out.iterdir()}
     schemes = {"damping_pinv", "observer_pinv", "observer_robust"}
-    assert names == {"summary.json", "comparison.png"} | {f"{s}.{end}" for s in schemes for end in ("npz", "png")}
+    assert names == {"summary.json", "mission.json", "comparison.png"} | {f"{s}.{end}" for s in schemes for end in ("npz", "png")}
     with np.load(out / "observer_robust.npz") as signals:
         assert signals["rate"].shape == (201, 3)
         assert signals["force"].shape == (201, 12)
@@ -77,7 +77,7 @@ def test_json_is_the_only_output(problem, tmp_path):
     summary = json.loads(done.stdout)
     assert summary["schemes"][0]["metrics"]["torque_sample_sum"]["value"] > 0
     assert summary["schemes"][0]["made"]["engine"] == "c"
-    assert {path.name for path in (tmp_path / "o").iterdir()} == {"damping_pinv.npz", "summary.json"}
+    assert {path.name for path in (tmp_path / "o").iterdir()} == {"damping_pinv.npz", "summary.json", "mission.json"}
 
 
 @pytest.mark.parametrize(

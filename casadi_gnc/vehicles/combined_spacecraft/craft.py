@@ -22,6 +22,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scene import Arrow, Jets, Scene
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.attitude import AttitudeStart
 from casadi_gnc.tables.disturbances import OrbitAndTorque
@@ -148,6 +149,25 @@ class CombinedSpacecraftCraft(Craft, Orientation):
             Panel("tracked", "mrp", "attitude MRP") if mission.funnels else Panel("tracked", "rate", "rate"),
             Panel("effort", "torque", "torque", 1e3, "mN m"),
             Panel("actuators", "force", "force, thruster no.", 1e3, "mN"),
+        )
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return the chaser as the box that holds its thrusters, about the combined centre of mass."""
+        thrusters, known = self.thrusters, self._view(self.matrix(), self.centre_of_mass_m).thrusters
+        corners = np.array([np.min(thrusters.positions_m, axis=0), np.max(thrusters.positions_m, axis=0)])
+        return Scene(
+            attitude="mrp",
+            reference="orbit frame",
+            size=[float(value) for value in np.maximum(corners[1] - corners[0], 0.02)],
+            centre=[float(value) for value in corners.mean(axis=0) - self.centre_of_mass_m],
+            turned=np.array(self.matrix()).tolist(),
+            jets=Jets(
+                "force",
+                np.array(known.positions).T.tolist(),
+                np.array(known.directions).T.tolist(),
+                [thrusters.max_force_N] * known.count,
+            ),
+            arrows=(Arrow("rate", "rate"), Arrow("achieved", "torque of the thrusters")),
         )
 
     def flaws(self) -> Iterator[MisfitError]:

@@ -21,6 +21,7 @@ from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scene import Arrow, Scene
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.signals import Layout, Signal
 from casadi_gnc.tables.part import MisfitError, Part, Positive, Vector, table
@@ -153,6 +154,15 @@ class DockingPairCraft(Craft):
             Panel("effort", "force", "force"),
             Panel("lines", "moment", "moment", 1e-3, "kA m²"),
             Panel("lines", "chaser_torque", "torque on chaser"),
+        )
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return the chaser on its way to the target, seen in the orbit frame."""
+        return Scene(
+            reference="orbit frame",
+            position="position",
+            other="target",
+            arrows=(Arrow("achieved", "force", "reference"), Arrow("velocity", "velocity", "reference")),
         )
 
     @property

@@ -22,6 +22,7 @@ from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scene import Arrow, Scene
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.disturbances import OrbitalPush
@@ -89,6 +90,17 @@ class DragFreePairCraft(Craft):
             Panel("tracked", "mrp", "relative attitude MRPs"),
             Panel("effort", "force", "force"),
             Panel("effort", "torque", "torque"),
+        )
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return the satellite about its test mass, seen in the frame of the test mass."""
+        return Scene(
+            attitude="mrp",
+            reference="test-mass frame",
+            position="position",
+            position_frame="body",
+            other="test mass",
+            arrows=(Arrow("achieved_force", "force"), Arrow("achieved_torque", "torque")),
         )
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:

@@ -21,6 +21,7 @@ from casadi_gnc.missions.actuation import Actuation
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scene import Arrow, Scene
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.disturbances import OrbitalPush
@@ -124,6 +125,19 @@ class ProximityPairCraft(Craft):
             ),
             Panel("effort", "force", "force"),
             Panel("effort", "torque", "torque"),
+        )
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return the chaser about the target, seen in the target's frame."""
+        return Scene(
+            attitude="attitude_error",
+            reference="target frame",
+            position="position_error",
+            position_frame="body",
+            offset=self.hold_point_m,
+            other="target",
+            keep_out=self.keep_out_radius_m,
+            arrows=(Arrow("achieved_force", "force"), Arrow("rate_error", "rate from the target")),
         )
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:

@@ -26,6 +26,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scene import Arrow, Scene, Spinners
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.attitude import AttitudeStart
@@ -162,6 +163,15 @@ class WheelSpacecraftCraft(Craft, Orientation):
             Panel("effort", "torque", "torque"),
             Panel("actuators", "wheel_acceleration", "wheel acc."),
             Panel("lines", "wheel_speed", "wheel speed"),
+        )
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return the body with its wheels along their axes."""
+        return Scene(
+            attitude="mrp",
+            reference="orbit frame",
+            spinners=Spinners("wheel_speed", np.array(self._array(_NOWHERE).axes).T.tolist()),
+            arrows=(Arrow("rate", "rate"), Arrow("true_torque", "torque of the wheels")),
         )
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
