@@ -59,7 +59,8 @@ def test_fly_writes_signals_summary_and_pictures(problem, tmp_path):
     assert done.returncode == 0, done.stderr
     names = {path.name for path in out.iterdir()}
     schemes = {"damping_pinv", "observer_pinv", "observer_robust"}
-    assert names == {"summary.json", "mission.json", "comparison.png"} | {f"{s}.{end}" for s in schemes for end in ("npz", "png")}
+    shared = {"summary.json", "mission.json", "comparison.png"}
+    assert names == shared | {f"{s}.{end}" for s in schemes for end in ("npz", "png")}
     with np.load(out / "observer_robust.npz") as signals:
         assert signals["rate"].shape == (201, 3)
         assert signals["force"].shape == (201, 12)
