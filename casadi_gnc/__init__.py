@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from casadi_gnc.checks import Check
     from casadi_gnc.delivery.fmu import generate_fmu
-    from casadi_gnc.delivery.packaging import generate
+    from casadi_gnc.delivery.generating import generate
     from casadi_gnc.delivery.verifying import verify
     from casadi_gnc.errors import GncError
     from casadi_gnc.laws import FORCE, FORCE_AND_TORQUE, TORQUE, Law, gain, option
@@ -69,7 +69,7 @@ _HOMES = {
     "fly": "problem_files.by_name",
     "fly_all": "problem_files.by_name",
     "gain": "laws",
-    "generate": "delivery.packaging",
+    "generate": "delivery.generating",
     "generate_fmu": "delivery.fmu",
     "load": "problem_files.loading",
     "option": "laws",

@@ -1,10 +1,10 @@
-"""`casadi-gnc generate`: a flight package or a functional mock-up unit of a mission's controller."""
+"""`casadi-gnc generate`: a flight package of a mission's controller or of a function, or a functional mock-up unit."""
 
 from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -24,7 +24,9 @@ class FormatChoice(str, Enum):
 
 
 def generate(
-    problem: Annotated[str, typer.Argument(help="A mission file, or the name of a shipped one.")],
+    problem: Annotated[
+        str, typer.Argument(help="A mission file or the name of a shipped one; a .casadi file of a function.")
+    ],
     out: Annotated[
         Path | None, typer.Option(help="Folder of the package, or the .fmu; flight/<name> if left out.")
     ] = None,
@@ -34,22 +36,37 @@ def generate(
     tunable: Annotated[str, typer.Option(help="Gains that stay variables of the C, apart by commas.")] = "",
     target: Annotated[str, typer.Option(help="Targets to measure for the README, apart by commas.")] = "",
     format: Annotated[FormatChoice, typer.Option(help="C package, or FMI 2.0 co-simulation.")] = FormatChoice.package,
-    steps: Annotated[int, typer.Option(help="Samples of the flight that is shipped as test vectors.")] = 1024,
+    steps: Annotated[
+        int | None, typer.Option(help="Samples that are shipped as test vectors; 1024 if left out.")
+    ] = None,
+    state: Annotated[
+        list[str] | None, typer.Option(help="Of a function: INPUT:OUTPUT, an input and its next value; once a pair.")
+    ] = None,
+    ports: Annotated[
+        Path | None, typer.Option(help="Of a function: TOML with a table a port: unit, note, initial (of a state).")
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Of a function: steps a second.")] = None,
+    vectors: Annotated[
+        Path | None, typer.Option(help="Of a function: CSV of the inputs of the shipped steps, columns x[0], x[1], ...")
+    ] = None,
     force: Annotated[bool, typer.Option(help="Overwrite a package whose files were edited.")] = False,
 ) -> None:
     """Write the controller as C that an embedded project takes as it is, with a flight to test it by."""
-    from casadi_gnc.delivery import packaging
+    from casadi_gnc.delivery import generating
+    from casadi_gnc.errors import PackageError
     from casadi_gnc.system.text import shell, terminal
 
     gains, boards = _words(tunable), _words(target)
     if format is FormatChoice.fmu:
         from casadi_gnc.delivery.fmu import generate_fmu
 
+        if state or ports or rate or vectors or Path(problem).suffix == generating.ENDING:
+            raise PackageError("a unit is made of a mission; leave out what is for a function")
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains)
         typer.echo(terminal(f"wrote {written}"))
         return
     folder = Path("flight") / (name or Path(problem).stem) if out is None else out
-    about = packaging.generate(
+    about = generating.generate(
         problem,
         folder,
         scheme=scheme,
@@ -59,12 +76,43 @@ def generate(
         target=boards,
         steps=steps,
         force=force,
+        state=_pairs(state) if state else None,
+        ports=_ports(ports) if ports else None,
+        rate=rate,
+        vectors=vectors,
     )
-    typer.echo(terminal(f"{about['title']}, scheme {about['scheme']}, {about['real']}: wrote {folder}"))
+    scheme_of = f", scheme {about['scheme']}" if about["scheme"] else ""
+    typer.echo(terminal(f"{about['title']}{scheme_of}, {about['real']}: wrote {folder}"))
     for warning in about["warnings"]:
         typer.echo(terminal(f"warning: {warning}"))
     place = shell(f"./{folder}" if str(folder).startswith("-") else folder)  # else it would be taken for an option
     typer.echo(f"next: make -C {place} test; casadi-gnc verify {place} --target host,cortex-m7")
+
+
+def _pairs(texts: list[str]) -> dict[str, str]:
+    """Return pairs input:output; raise `PackageError` for other texts."""
+    from casadi_gnc.errors import PackageError
+
+    pairs: dict[str, str] = {}
+    for text in texts:
+        before, colon, after = (part.strip() for part in text.partition(":"))
+        if not (before and colon and after) or before in pairs:
+            told = "is named twice" if before in pairs else "is no pair"
+            raise PackageError(f"--state {text!r} {told}; expected INPUT:OUTPUT, once for each state")
+        pairs[before] = after
+    return pairs
+
+
+def _ports(path: Path) -> dict[str, Any]:
+    """Return what a file says of ports."""
+    import tomllib
+
+    from casadi_gnc.errors import PackageError
+
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise PackageError(f"{path} cannot be read as TOML: {error}; expected a table for each port") from None
 
 
 def _words(text: str) -> list[str]:

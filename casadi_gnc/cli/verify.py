@@ -50,10 +50,11 @@ def _write(path: Path, found: dict[str, Any]) -> None:
 
 
 def _print(found: dict[str, Any]) -> None:
-    _say(f"{found['title']}, scheme {found['scheme']}, {found['real']}, {found['steps']} samples")
+    scheme = f", scheme {found['scheme']}" if found["scheme"] else ""
+    _say(f"{found['title']}{scheme}, {found['real']}, {found['steps']} samples")
     for one in found["comparisons"]:
         verdict = f"{one['words']} of {one['of']} words differ"
-        _say(f"  {one['what']}: {verdict}{'' if one['exact'] else ' (as they must between types)'}")
+        _say(f"  {one['what']}: {verdict}{'' if one['exact'] else ' (as they may)'}")
         for signal in one["signals"]:
             if signal["words"]:
                 _say(

@@ -2,7 +2,7 @@
 
 A mission that was read from a file is kept as that file, with every file of the user's own code that it names;
 `verify` builds it again from there. A mission that was made from objects is kept as its controller,
-`controller.json`: whatever the objects were, what flies is in it.
+`controller.json`: whatever the objects were, what flies is in it. A function is kept as `function.json`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from casadi_gnc import guests
-from casadi_gnc.embedded import package, saving
+from casadi_gnc.embedded import flight_function, package, saving
 from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.packable import Packable, PackableController, PackableFunction
 from casadi_gnc.errors import GncError, PackageError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.onboard import describe, sampled
@@ -21,7 +22,9 @@ from casadi_gnc.missions.origin import Origin
 from casadi_gnc.problem_files.document import of_text
 from casadi_gnc.problem_files.loading import load, load_document
 
-PROBLEM, CONTROLLER = "problem.toml", "controller.json"
+PROBLEM, CONTROLLER, FUNCTION = "problem.toml", "controller.json", "function.json"
+#: The file that a package keeps, by what it was made of.
+KEPT = {"": PROBLEM, "objects": CONTROLLER, "function": FUNCTION}
 
 
 def kept(
@@ -62,8 +65,8 @@ def load_again(origin: Origin) -> Mission:
     return load_document(of_text(path, origin.text), origin.changes, strict=False)
 
 
-def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tuple[Mission | None, Controller]:
-    """Return the mission, where a file is kept, and the controller of a package.
+def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tuple[Mission | None, Packable]:
+    """Return the mission, where a file is kept, and what a package was made of.
 
     Raises
     ------
@@ -71,17 +74,25 @@ def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tupl
         Where what was kept is gone or was changed.
     """
     problem = about.get("problem", {})
+    if problem.get("made_of") == "function":
+        return None, PackableFunction(flight_function.from_text(_kept(folder, FUNCTION, problem["sha256"])))
     if problem.get("made_of") == "objects":
-        return None, saving.from_text(_read(folder / CONTROLLER))
+        return None, PackableController(saving.from_text(_read(folder / CONTROLLER)))
     for path, sha256 in problem.get("code", {}).items():
-        found = guests.GuestFile(path, _read(folder / path))
-        if found.sha256 != sha256:
-            raise PackageError(
-                f"{folder / path} was changed since the package was generated (sha256 {found.sha256[:12]}, expected "
-                f"{sha256[:12]}); generate the package again"
-            )
+        _kept(folder, path, sha256)
     mission = sampled(load(folder / PROBLEM, problem.get("changes")))
-    return mission, describe(mission, about["scheme"], tunable, monitored=True)
+    return mission, PackableController(describe(mission, about["scheme"], tunable, monitored=True))
+
+
+def _kept(folder: Path, path: str, sha256: str) -> str:
+    """Return the text of a file that must be the one of the manifest."""
+    found = guests.GuestFile(path, _read(folder / path))
+    if found.sha256 != sha256:
+        raise PackageError(
+            f"{folder / path} was changed since the package was generated (sha256 {found.sha256[:12]}, expected "
+            f"{sha256[:12]}); generate the package again"
+        )
+    return found.text
 
 
 def _read(path: Path) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from casadi_gnc.checking import numbers
 from casadi_gnc.delivery import making
@@ -15,6 +17,7 @@ from casadi_gnc.embedded import package, targets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import MOST_STEPS
+from casadi_gnc.embedded.packable import Packable, PackableController
 from casadi_gnc.embedded.readme import render_readme
 from casadi_gnc.errors import PackageError
 from casadi_gnc.missions.mission import Mission
@@ -65,9 +68,7 @@ def generate(
     if steps > MOST_STEPS:
         raise PackageError(f"steps is {steps}, expected at most {MOST_STEPS}: vectors are text in the package")
     options = Options(mission.name if name is None else name, REALS[real])  # type: ignore[arg-type]
-    boards = [known_boards.find(one) for one in dict.fromkeys(target)]
-    for board in boards:
-        board.need()
+    boards = found_boards(target)
     package.check_room(folder, force)
     controller = describe(mission, scheme, tunable, monitored=True)
     sources, made_of = making.kept(mission, controller, options, fresh=not isinstance(problem, Mission))
@@ -81,32 +82,77 @@ def generate(
         "steps": steps,
         "spoiled": SPOILED,
         "problem": made_of,
-        "made_by": {"casadi_gnc": metadata.version("casadi-gnc"), "casadi": metadata.version("casadi")},
+        "made_by": made_by(),
     }
 
+    def flown(host: HostPackage) -> tuple[np.ndarray, np.ndarray]:
+        outputs = controller.replayed.size + 1
+        return fly_package(mission, mission.scheme(controller.scheme), host, outputs, steps, SPOILED)
+
+    def readme(measured: list[dict[str, Any]], sizes: tuple[int, int]) -> str:
+        return render_readme(controller, options, about, measured, sizes)
+
+    pack(folder, PackableController(controller), options, about, flown, readme, sources, boards, force=force)
+    return {**about, "warnings": warnings(mission, controller.scheme, real)}
+
+
+def made_by() -> dict[str, str]:
+    """Return the versions that write a package."""
+    return {"casadi_gnc": metadata.version("casadi-gnc"), "casadi": metadata.version("casadi")}
+
+
+def found_boards(target: Sequence[Any]) -> list[known_boards.Target]:
+    """Return targets, each once; raise `TargetError` for unknown ones and for tools that are missing."""
+    boards = [known_boards.find(one) for one in dict.fromkeys(target)]
+    for board in boards:
+        board.need()
+    return boards
+
+
+def pack(
+    folder: Path,
+    thing: Packable,
+    options: Options,
+    about: dict[str, Any],
+    flown: Callable[[HostPackage], tuple[np.ndarray, np.ndarray]],
+    readme: Callable[[list[dict[str, Any]], tuple[int, int]], str],
+    sources: dict[str, str],
+    boards: Sequence[known_boards.Target],
+    *,
+    force: bool,
+) -> None:
+    """Write a package: its C, vectors that the C itself answers on this machine, README, manifest.
+
+    Parameters
+    ----------
+    thing : what is packed.
+    about : of the manifest, with "steps", "spoiled" and "real".
+    flown : gives the words in and out of the vectors from the compiled package.
+    readme : its text, from the rows of the targets and the bytes of state and parameters.
+    sources : files of what it was made of.
+    boards : targets to measure.
+    force : overwrite files that were edited.
+    """
+
     def files_of(workshop: Path) -> dict[str, str]:
-        files = package.flight_files(controller, options)
-        package.put(workshop, {**files, "test/replay.h": package.replay_header(controller, options, steps)})
+        files = thing.files(options)
+        package.put(workshop, {**files, "test/replay.h": thing.replay_header(options, about["steps"])})
         host = HostPackage(workshop, options.name)
-        flown = fly_package(
-            mission, mission.scheme(controller.scheme), host, controller.replayed.size + 1, steps, SPOILED
-        )
-        files |= package.replay_files(controller, options, *flown, SPOILED)
+        files |= thing.replay_files(options, *flown(host), about["spoiled"])
         package.put(workshop, files)
         measured = [
             {
                 "target": board.name,
-                **targets.measure(workshop, options.name, board, float_only=real == "float32").summary(),
+                **targets.measure(workshop, options.name, board, float_only=about["real"] == "float32").summary(),
             }
             for board in boards
         ]
-        files["README.md"] = render_readme(controller, options, about, measured, (host.state_size, host.params_size))
+        files["README.md"] = readme(measured, (host.state_size, host.params_size))
         files |= sources
         files[package.MANIFEST] = package.manifest(files, about)
         return files
 
     package.write(folder, files_of, force=force)
-    return {**about, "warnings": warnings(mission, controller.scheme, real)}
 
 
 def warnings(mission: Mission | None, scheme: str, real: str) -> list[str]:

@@ -15,10 +15,10 @@ from casadi_gnc.delivery import making
 from casadi_gnc.delivery.packaging import REALS, warnings
 from casadi_gnc.delivery.vectors import WORDS, fly_package
 from casadi_gnc.embedded import compare, package
-from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
-from casadi_gnc.embedded.machine import Machine
 from casadi_gnc.embedded.manifest import digest
+from casadi_gnc.embedded.packable import Packable
 from casadi_gnc.errors import PackageError
 from casadi_gnc.system import compilers
 
@@ -58,65 +58,64 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
     word, (steps, width, height) = WORDS[about["real"]], about["shape"]
     inputs = take_words(shop, "inputs", (steps, width), word)
     outputs = take_words(shop, "outputs", (steps, height), word)
-    mission, controller = making.rebuilt(shop / MADE_OF, about, about["tunable"])
-    expected = 1 + controller.measured.size, controller.replayed.size + 1
+    mission, made = making.rebuilt(shop / MADE_OF, about, about["tunable"])
+    expected = made.given, made.replayed.size + 1
     if (width, height) != expected:
         raise PackageError(
             f"the vectors have {width} numbers in and {height} out a sample, the controller has {expected[0]} and "
             f"{expected[1]}; generate the package again"
         )
     options = Options(about["name"], REALS[about["real"]])  # type: ignore[arg-type]
-    files = package.flight_files(controller, options)
-    files |= package.replay_files(controller, options, inputs, outputs, about["spoiled"])
+    files = made.files(options)
+    files |= made.replay_files(options, inputs, outputs, about["spoiled"])
     package.put(shop / ANEW, files)
     host = HostPackage(shop / ANEW, options.name)
     put_words(shop, "anew", host.replay(inputs, height))
     if mission is not None:
         host.reset()
-        scheme = mission.scheme(controller.scheme)
+        scheme = mission.scheme(made.scheme)
         flown = fly_package(mission, scheme, host, height, steps, about["spoiled"])
         put_words(shop, "flown_in", flown[0])
         put_words(shop, "flown_out", flown[1])
     other = _on_the_machine if options.real == "double" else _in_double
-    for name, words in other(shop, controller, options, inputs).items():
+    for name, words in other(shop, made, options, inputs).items():
         put_words(shop, name, words)
     return {
         "files": {path: digest(text) for path, text in files.items()},
-        "outputs": [{"name": one.name, "size": one.size, "unit": one.unit} for one in controller.replayed.signals],
-        "title": controller.title,
-        "scheme": controller.scheme,
+        "outputs": [{"name": one.name, "size": one.size, "unit": one.unit} for one in made.replayed.signals],
+        "title": made.title,
+        "scheme": made.scheme,
+        "is_exact": made.is_exact,
         "is_flown": mission is not None,
         "is_named": (mission is None or mission.digest == about["problem"]["sha256"]),
-        "warnings": warnings(mission, controller.scheme, about["real"]),
+        "warnings": warnings(mission, made.scheme, about["real"]),
     }
 
 
-def _on_the_machine(shop: Path, controller: Controller, options: Options, inputs: np.ndarray) -> dict[str, np.ndarray]:
+def _on_the_machine(shop: Path, made: Packable, options: Options, inputs: np.ndarray) -> dict[str, np.ndarray]:
     """Return the words of the C with the C library's functions, and those of CasADi's machine."""
     libm = Options(options.name, maths="libm")
-    machine = Machine(controller).replay(compare.as_numbers(inputs))
+    machine = made.on_the_machine(compare.as_numbers(inputs))
     expected = compare.as_words(machine, inputs.dtype)
     expected[:, -1] = machine[:, -1].astype(int)
-    return {"other": _made(shop / "libm", controller, libm, inputs, ("-O2", "-fno-builtin")), "expected": expected}
+    return {"other": _made(shop / "libm", made, libm, inputs, ("-O2", "-fno-builtin")), "expected": expected}
 
 
-def _in_double(shop: Path, controller: Controller, options: Options, inputs: np.ndarray) -> dict[str, np.ndarray]:
+def _in_double(shop: Path, made: Packable, options: Options, inputs: np.ndarray) -> dict[str, np.ndarray]:
     """Return the words that double precision gives from the same measurements, rounded to floats."""
     wide = compare.as_words(compare.as_numbers(inputs).astype(float), np.dtype(np.uint64))
-    replayed = _made(shop / "double", controller, Options(options.name), wide, ("-O2",))
+    replayed = _made(shop / "double", made, Options(options.name), wide, ("-O2",))
     reals = compare.as_numbers(np.ascontiguousarray(replayed[:, :-1]))
     expected = np.column_stack([compare.as_words(reals, inputs.dtype), replayed[:, -1].astype(np.uint32)])
     return {"expected": expected.astype(np.uint32)}
 
 
-def _made(
-    folder: Path, controller: Controller, options: Options, inputs: np.ndarray, flags: tuple[str, ...]
-) -> np.ndarray:
+def _made(folder: Path, made: Packable, options: Options, inputs: np.ndarray, flags: tuple[str, ...]) -> np.ndarray:
     """Return the output words of the controller made anew with other options."""
-    files = package.flight_files(controller, options)
-    files["test/replay.h"] = package.replay_header(controller, options, len(inputs))
+    files = made.files(options)
+    files["test/replay.h"] = made.replay_header(options, len(inputs))
     package.put(folder, files)
-    return HostPackage(folder, options.name, flags=flags).replay(inputs, controller.replayed.size + 1)
+    return HostPackage(folder, options.name, flags=flags).replay(inputs, made.replayed.size + 1)
 
 
 def replay(shop: Path, given: dict[str, Any]) -> None:

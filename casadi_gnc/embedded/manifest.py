@@ -46,10 +46,10 @@ class _Model(BaseModel):
 
 
 class MadeOf(_Model):
-    """What a package was made of: a problem file with what was changed and the user's own code, or objects."""
+    """What a package was made of: a problem file, what was changed and the user's own code; objects; a function."""
 
     sha256: _Hash
-    made_of: Literal["", "objects"] = ""
+    made_of: Literal["", "objects", "function"] = ""
     file: str = ""
     changes: dict[str, Any] = {}
     code: dict[_Path, _Hash] = {}

@@ -50,6 +50,7 @@ def replay_header(controller: Controller, options: Options, steps: int) -> str:
         inputs=["input->time", *access(controller.measured, "input->")],
         outputs=outputs,
         watched=watched,
+        status="output->step.status" if watched else "output->status",
     )  # fmt: skip
 
 
@@ -59,12 +60,22 @@ def replay_files(
     """Return the replay program, its vectors (rows of words) and the files that build it."""
     units = [f"{options.name}.c", *allocator_files(controller, options)]
     units += [file for file in monitor_files(controller, options) if file.endswith(".c")]
+    header = replay_header(controller, options, len(inputs))
+    what = "a closed loop with the simulated craft"
+    what += f", the last {spoiled} with bad measurements" if spoiled else ""
+    return replay_texts(options, units, header, inputs, outputs, what)
+
+
+def replay_texts(
+    options: Options, units: list[str], header: str, inputs: np.ndarray, outputs: np.ndarray, what: str
+) -> dict[str, str]:
+    """Return the replay program of any package; `what` says what its vectors are samples of."""
     about = {"name": options.name, "units": units, "bits": 64 if options.real == "double" else 32}
-    vectors = {"inputs": _rows(inputs), "outputs": _rows(outputs), "steps": len(inputs), "spoiled": spoiled}
+    vectors = {"inputs": _rows(inputs), "outputs": _rows(outputs), "steps": len(inputs)}
     return {
-        "test/replay.h": replay_header(controller, options, len(inputs)),
+        "test/replay.h": header,
         "test/replay.c": template("package_replay.c.j2").render(**about),
-        "test/vectors.c": template("package_vectors.c.j2").render(**about, **vectors),
+        "test/vectors.c": template("package_vectors.c.j2").render(**about, **vectors, what=what),
         "Makefile": template("package_makefile.j2").render(**about),
         "CMakeLists.txt": template("package_cmake.j2").render(**about),
     }

@@ -7,6 +7,7 @@ Flags are Boolean in the C, numbers in CasADi; `expression` turns one into the o
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -49,6 +50,19 @@ _CALLS = {
     ca.OP_FMOD: "fmod",
     ca.OP_COPYSIGN: "copysign",
 }
+#: Functions of the C library that gnc_math.h does not have.
+_LIBRARY = {ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh", ca.OP_HYPOT: "hypot"}
+#: Operations that gnc_math.h does not have, as those that it has; {x} and {y} stand for the operands.
+_COMPOSED = {
+    ca.OP_ASINH: "(fabs({x}) > {big}) ? copysign(log(fabs({x})) + {ln2}, {x}) : "
+    "copysign(log1p(fabs({x}) + ({x} * {x}) / ({one} + sqrt({one} + {x} * {x}))), {x})",
+    ca.OP_ACOSH: "({x} > {big}) ? log({x}) + {ln2} : log1p(({x} - {one}) + sqrt(({x} - {one}) * ({x} + {one})))",
+    ca.OP_ATANH: "copysign({half} * log1p((fabs({x}) + fabs({x})) / ({one} - fabs({x}))), {x})",
+    ca.OP_HYPOT: "(fabs({x}) > fabs({y})) ? "
+    "fabs({x}) * sqrt({one} + ({y} / {x}) * ({y} / {x})) : "
+    "(({y} != {zero}) ? fabs({y}) * sqrt({one} + ({x} / {y}) * ({x} / {y})) : fabs({y}))",
+}
+_FUNCTION = re.compile(r"\b(fabs|copysign|log1p|log|sqrt)\(")
 #: Normal numbers of single precision.
 _LEAST_FLOAT, LARGEST_FLOAT = float(np.finfo(np.float32).tiny), float(np.finfo(np.float32).max)
 _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")}
@@ -88,18 +102,23 @@ def expression(node: Node, flags: list[bool], maths: Math, real: Real) -> str:
     a = [f"({{{i}}} ? {one} : {zero})" if flag else f"{{{i}}}" for i, flag in enumerate(flags)]
     true = [f"{{{i}}}" if flag else f"({{{i}}} != {zero})" for i, flag in enumerate(flags)]
     code = node.code
+    suffix, prefix = "f" if real == "float" else "", "gnc_" if maths == "gnc" else ""
+    if code in _COMPOSED and maths == "gnc":
+        numbers = {"half": 0.5, "big": 2.0**28, "ln2": math.log(2.0)}
+        written = {name: c_constant(number, real) for name, number in numbers.items()}
+        text = _FUNCTION.sub(rf"gnc_\1{suffix}(", _COMPOSED[code])
+        return text.format(x=a[0], y=a[-1], one=one, zero=zero, **written)
     if code in _INFIX:
         return f"{a[0]} {_INFIX[code]} {a[1]}"
     if code in _COMPARE:
         return f"{a[0]} {_COMPARE[code]} {a[1]}"
-    if code in _CALLS:
-        suffix = "f" if real == "float" else ""
-        prefix = "gnc_" if maths == "gnc" else ""
-        return f"{prefix}{_CALLS[code]}{suffix}({', '.join(a)})"
+    if code in _CALLS or code in _LIBRARY:
+        return f"{prefix}{(_CALLS | _LIBRARY)[code]}{suffix}({', '.join(a)})"
     x, y = (a + [""] * 2)[:2]
     p, q = (true + [""] * 2)[:2]
     shapes = {
         ca.OP_ASSIGN: x,
+        ca.OP_LIFT: x,
         ca.OP_NEG: f"-{x}",
         ca.OP_SQ: f"{x} * {x}",
         ca.OP_TWICE: f"{x} + {x}",

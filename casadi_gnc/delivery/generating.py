@@ -1,0 +1,76 @@
+"""Generate C from whatever can become C: the controller of a mission, or a function."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.delivery import packaging
+from casadi_gnc.delivery.functions import generate_function
+from casadi_gnc.errors import PackageError
+from casadi_gnc.missions.mission import Mission
+
+#: Ending of files that CasADi's `Function.save` writes.
+ENDING = ".casadi"
+
+
+def generate(
+    thing: str | Path | Mission | ca.Function,
+    out: str | Path,
+    *,
+    name: str | None = None,
+    real: str = "float64",
+    target: Sequence[Any] = (),
+    steps: int | None = None,
+    force: bool = False,
+    scheme: str | None = None,
+    tunable: Sequence[str] = (),
+    state: Mapping[str, str] | None = None,
+    ports: Mapping[str, Any] | None = None,
+    rate: float | None = None,
+    vectors: str | Path | np.ndarray | None = None,
+) -> dict[str, Any]:
+    """Write a flight package; return what was made of what.
+
+    Parameters
+    ----------
+    thing : a mission, a mission file or the name of a shipped one; a CasADi function, or a .casadi file.
+    out : folder of the package.
+    name : prefix of every symbol; the mission's or the function's name by default.
+    real : "float64" or "float32".
+    target : targets to measure for the README.
+    steps : samples that are shipped as test vectors; 1024 by default.
+    force : overwrite a package that was edited.
+    scheme, tunable : of a mission, as for `casadi_gnc.delivery.packaging.generate`.
+    state, ports, rate, vectors : of a function, as for `casadi_gnc.delivery.functions.generate_function`.
+
+    Raises
+    ------
+    GncError
+        Where something given is not right; the folder is left as it was.
+
+    Examples
+    --------
+    >>> x, i = ca.SX.sym("x"), ca.SX.sym("i")
+    >>> law = ca.Function("law", [x, i], [-2 * x - i, i + 0.01 * x], ["x", "i"], ["u", "i_next"])
+    >>> about = generate(law, "fw/law", state={"i": "i_next"}, rate=100)  # doctest: +SKIP
+    """
+    common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force}
+    if isinstance(thing, ca.Function) or (not isinstance(thing, Mission) and Path(thing).suffix == ENDING):
+        _refuse({"scheme": scheme, "tunable": tunable}, "a function")
+        own = {"state": state, "ports": ports, "rate": rate, "vectors": vectors, "steps": steps}
+        return generate_function(thing, out, **common, **own)
+    _refuse({"state": state, "ports": ports, "rate": rate, "vectors": vectors}, "a mission")
+    steps = packaging.STEPS if steps is None else steps
+    return packaging.generate(thing, out, **common, scheme=scheme, tunable=tunable, steps=steps)
+
+
+def _refuse(options: dict[str, Any], what: str) -> None:
+    """Raise `PackageError` for the first of some options that was given."""
+    for name, value in options.items():
+        if value is not None and not (isinstance(value, Sequence) and not value):
+            raise PackageError(f"{name} is not for {what}; leave it out")

@@ -1,0 +1,57 @@
+"""Step a flight function on CasADi's virtual machine, in the order of the generated step."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction
+from casadi_gnc.embedded.parts import Parts
+
+_BITS = {name: bit for bit, (name, _) in STATUSES.items()}
+
+
+class FunctionMachine:
+    """Step a function in double precision; the reference that compiled code is compared with."""
+
+    def __init__(self, own: FlightFunction) -> None:
+        self._own = own
+        self._memory = np.array(own.initial)
+        self._last = np.zeros(own.outputs.size)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the C computes in the order of this machine."""
+        parts = Parts()
+        parts.function(self._own.function)
+        return parts.is_exact
+
+    def step(self, row: np.ndarray) -> np.ndarray:
+        """Return outputs, state and status of a step."""
+        status = 0 if np.isfinite(row).all() else _BITS["INPUT_REFUSED"]
+        if not status:
+            status = self._advance(row)
+        return np.concatenate([self._last, self._memory, [status]])
+
+    def _advance(self, row: np.ndarray) -> int:
+        own, function = self._own, self._own.function
+        given = []
+        for i, name in enumerate(function.name_in()):
+            layout, column = (own.state, self._memory) if name in own.pairs else (own.inputs, row)
+            values = column[layout.place(name)] if name in layout else np.zeros(0)
+            given.append(ca.reshape(ca.DM(values), *function.size_in(i)))
+        try:
+            results = dict(zip(function.name_out(), function.call(given), strict=True))
+        except RuntimeError:  # what CasADi says of a singular matrix
+            return _BITS["SINGULAR"]
+        found = {name: np.array(ca.vec(value)).ravel() for name, value in results.items()}
+        outputs = np.concatenate([np.zeros(0), *(found[name] for name in own.outputs.names)])
+        after = np.concatenate([np.zeros(0), *(found[own.pairs[name]] for name in own.state.names)])
+        if not (np.isfinite(outputs).all() and np.isfinite(after).all()):
+            return _BITS["RESULT_REFUSED"]
+        self._last, self._memory = outputs, after
+        return 0
+
+    def replay(self, rows: np.ndarray) -> np.ndarray:
+        """Return outputs, state and status of steps (K, inputs), from the first one on."""
+        return np.array([self.step(row) for row in rows])

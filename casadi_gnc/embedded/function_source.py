@@ -1,0 +1,107 @@
+"""Print a flight function as C: header and source, and the files that replay it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction
+from casadi_gnc.embedded.members import access, declaration
+from casadi_gnc.embedded.parts import Parts
+from casadi_gnc.signals import Layout
+from casadi_gnc.system import assets
+from casadi_gnc.system.templates import template
+
+#: Up to so many numbers are tested one by one, more by a loop.
+_SHORT = 4
+
+
+def function_files(own: FlightFunction, options: Options) -> dict[str, str]:
+    """Return the files that fly: path inside the package -> text.
+
+    Raises
+    ------
+    PrinterError
+        For what has no C form: the node, where it comes from, and what to do.
+    """
+    parts = Parts(options.maths, options.real, options.name.upper())
+    callee = parts.function(own.function)
+    about = common(own, options)
+    source = template("function_source.c.j2").render(
+        **about,
+        maths=options.maths,
+        parts=parts.text(),
+        call=f"{callee.name}({', '.join(_arguments(own) + (['&now.outputs.status'] if callee.asks else []))});",
+        given=_finite(own.inputs, "input->"),
+        found=_finite(own.outputs, "now->outputs.") + _finite(own.state, "now->after."),
+        long=any(one.size > _SHORT for one in (*own.inputs.signals, *own.outputs.signals, *own.state.signals)),
+        initial=list(zip(access(own.state, "state->memory."), map(options.constant, own.initial), strict=True)),
+        largest="FLT_MAX" if options.real == "float" else "DBL_MAX",
+        fabs=f"{'gnc_' if options.maths == 'gnc' else ''}fabs{'f' if options.real == 'float' else ''}",
+    )
+    runtime = assets.folder("codegen") / "runtime"
+    maths = ["gnc_arithmetic.h"]
+    if options.maths == "gnc":
+        maths += ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
+    files = {f"{options.name}.h": template("function_header.h.j2").render(**about), f"{options.name}.c": source}
+    files |= {name: (runtime / name).read_text(encoding="utf-8") for name in maths}
+    return {**files, "LICENSE": (assets.folder("codegen") / "LICENSE").read_text(encoding="utf-8")}
+
+
+def common(own: FlightFunction, options: Options) -> dict[str, Any]:
+    """Return what header, source and README say of the ports."""
+    return {
+        "name": options.name,
+        "NAME": options.name.upper(),
+        "title": own.title,
+        "real": options.real,
+        "period": options.constant(own.period) if own.period else "",
+        "inputs": _members(own, own.inputs),
+        "state": _members(own, own.state),
+        "outputs": _members(own, own.outputs),
+        "statuses": [{"value": b, "name": n, "sentence": s} for b, (n, s) in STATUSES.items()],
+    }
+
+
+def _members(own: FlightFunction, layout: Layout) -> list[dict[str, str]]:
+    rows = []
+    for signal in layout.signals:
+        note = [signal.unit or "-", own.shape(signal.name), own.notes.get(signal.name, "")]
+        rows.append({"declaration": declaration(signal), "note": ", ".join(part for part in note if part)})
+    return rows
+
+
+def _finite(layout: Layout, owner: str) -> list[str]:
+    """Return C that tests whether the numbers of a struct are finite."""
+    tests = []
+    for signal in layout.signals:
+        if signal.size > _SHORT:
+            tests.append(f"all_finite({signal.size}, {owner}{signal.name})")
+        else:
+            tests += [f"is_finite({place})" for place in access(Layout((signal,)), owner)]
+    return tests
+
+
+def _arguments(own: FlightFunction) -> list[str]:
+    """Return the arguments of the printed function, port by port."""
+    function, after = own.function, {output: name for name, output in own.pairs.items()}
+    places = []
+    for name in function.name_in():
+        owner = "state->memory." if name in own.pairs else "input->"
+        places.append((f"{owner}{name}", function.numel_in(name)))
+    for name in function.name_out():
+        owner = f"now.after.{after[name]}" if name in after else f"now.outputs.{name}"
+        places.append((owner, function.numel_out(name)))
+    return [place if size > 1 else f"&{place}" if size else "0" for place, size in places]
+
+
+def replay_header(own: FlightFunction, options: Options, steps: int) -> str:
+    """Return `test/replay.h`, which names the words of inputs and outputs."""
+    return template("function_replay.h.j2").render(
+        name=options.name,
+        bits=64 if options.real == "double" else 32,
+        steps=steps,
+        inputs=access(own.inputs, "input->"),
+        outputs=[*access(own.outputs, "output->step."), *access(own.state, "output->state->memory.")],
+        status="output->step.status",
+    )

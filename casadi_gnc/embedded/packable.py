@@ -1,0 +1,151 @@
+"""What a package can be made of, and what every kind of it answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from casadi_gnc.embedded import function_source, package
+from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.flight_function import FlightFunction
+from casadi_gnc.embedded.function_machine import FunctionMachine
+from casadi_gnc.embedded.machine import Machine
+from casadi_gnc.signals import Layout
+
+
+class Packable(Protocol):
+    """Answer what a package is made of and compared with."""
+
+    @property
+    def title(self) -> str:
+        """What it is, for people."""
+        ...
+
+    @property
+    def scheme(self) -> str:
+        """Name of the mission's scheme, "" where there is no mission."""
+        ...
+
+    @property
+    def given(self) -> int:
+        """Numbers that a sample of the replay is given."""
+        ...
+
+    @property
+    def replayed(self) -> Layout:
+        """What a replay compares besides the status."""
+        ...
+
+    def files(self, options: Options) -> dict[str, str]:
+        """Return the files that fly: path inside the package -> text."""
+        ...
+
+    def replay_header(self, options: Options, steps: int) -> str:
+        """Return `test/replay.h`."""
+        ...
+
+    def replay_files(self, options: Options, inputs: np.ndarray, outputs: np.ndarray, spoiled: int) -> dict[str, str]:
+        """Return the replay program, its vectors (rows of words) and the files that build it."""
+        ...
+
+    def on_the_machine(self, rows: np.ndarray) -> np.ndarray:
+        """Return outputs and status (K, replayed + 1) of samples (K, given) by CasADi's virtual machine."""
+        ...
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether that machine computes in the order of the C."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class PackableController:
+    """Pack the controller of a mission."""
+
+    own: Controller
+    is_exact = True
+
+    @property
+    def title(self) -> str:
+        """Title of the mission."""
+        return self.own.title
+
+    @property
+    def scheme(self) -> str:
+        """Name of the scheme."""
+        return self.own.scheme
+
+    @property
+    def given(self) -> int:
+        """The time, and what is measured."""
+        return 1 + self.own.measured.size
+
+    @property
+    def replayed(self) -> Layout:
+        """Outputs, and what the monitor says."""
+        return self.own.replayed
+
+    def files(self, options: Options) -> dict[str, str]:
+        """Return the files that fly."""
+        return package.flight_files(self.own, options)
+
+    def replay_header(self, options: Options, steps: int) -> str:
+        """Return `test/replay.h`."""
+        return package.replay_header(self.own, options, steps)
+
+    def replay_files(self, options: Options, inputs: np.ndarray, outputs: np.ndarray, spoiled: int) -> dict[str, str]:
+        """Return what replays a flight."""
+        return package.replay_files(self.own, options, inputs, outputs, spoiled)
+
+    def on_the_machine(self, rows: np.ndarray) -> np.ndarray:
+        """Return what CasADi's machine gives."""
+        return Machine(self.own).replay(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class PackableFunction:
+    """Pack a function."""
+
+    own: FlightFunction
+    scheme = ""
+
+    @property
+    def title(self) -> str:
+        """What it is."""
+        return self.own.title
+
+    @property
+    def given(self) -> int:
+        """The inputs."""
+        return self.own.inputs.size
+
+    @property
+    def replayed(self) -> Layout:
+        """Outputs, and the state after the step."""
+        return self.own.replayed
+
+    def files(self, options: Options) -> dict[str, str]:
+        """Return the files that fly."""
+        return function_source.function_files(self.own, options)
+
+    def replay_header(self, options: Options, steps: int) -> str:
+        """Return `test/replay.h`."""
+        return function_source.replay_header(self.own, options, steps)
+
+    def replay_files(self, options: Options, inputs: np.ndarray, outputs: np.ndarray, spoiled: int) -> dict[str, str]:
+        """Return what replays the vectors."""
+        header = self.replay_header(options, len(inputs))
+        what = "inputs and answers of the function"
+        what += f", the last {spoiled} with bad inputs" if spoiled else ""
+        return package.replay_texts(options, [f"{options.name}.c"], header, inputs, outputs, what)
+
+    def on_the_machine(self, rows: np.ndarray) -> np.ndarray:
+        """Return what CasADi's machine gives."""
+        return FunctionMachine(self.own).replay(rows)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether there is no linear system in it: CasADi's own solvers go another way."""
+        return FunctionMachine(self.own).is_exact

@@ -1,0 +1,339 @@
+"""Print a program as C functions of bounded length.
+
+A short program is one function. A long one is a row of them, each with at most `LENGTH` statements. What one leaves to
+a later one lies in an array that they share, whose places are used again: neither compilers nor stacks see the size.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import casadi as ca
+
+from casadi_gnc.embedded.programs import Call, Port, Program
+from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Real, c_constant, expression, uses
+from casadi_gnc.errors import PrinterError
+
+#: Most statements of one C function.
+LENGTH = 1000
+#: From so many numbers on, what lies side by side is copied by a loop.
+_RUN = 8
+_PLACE = re.compile(r"(\w+)\[(\d+)\]")
+
+
+@dataclass(frozen=True)
+class _Copy:
+    """Copy numbers that lie side by side."""
+
+    target: str
+    at: int
+    source: str
+    start: int
+    count: int
+
+
+@dataclass(frozen=True)
+class _Store:
+    """Store a scalar in a result."""
+
+    target: str
+    at: int
+    node: int
+
+
+_Item = int | Call | _Copy | _Store
+
+
+def declare(name: str, inputs: Iterable[Port], outputs: Iterable[Port], asks: bool) -> str:
+    """Return the head of a C function: arguments, results, and the status where it has something to say."""
+    given = [f"const gnc_real *{port.name}" for port in inputs] + [f"gnc_real *{port.name}" for port in outputs]
+    given += ["uint32_t *status"] if asks else []
+    return f"static void {name}(\n    {(',' + chr(10) + '    ').join(given) or 'void'})"
+
+
+class _Printer:
+    """Print one program."""
+
+    def __init__(self, name: str, program: Program, maths: Math, real: Real) -> None:
+        self._name, self._program = name, program
+        self._maths: Math = maths
+        self._real: Real = real
+        self._nodes = program.nodes
+        self._zero, self._one = c_constant(0.0, real), c_constant(1.0, real)
+        wanted = [node for *_, node in program.stores]
+        wanted += [node for call in program.calls for argument in call.arguments for node in argument]
+        self._used, self._compared = uses(self._nodes, wanted)
+        self._place: dict[int, tuple[str, int]] = {}
+        for k in self._used:
+            if self._nodes[k].code == ca.OP_INPUT:
+                found = _PLACE.fullmatch(self._nodes[k].place)
+                assert found is not None
+                self._place[k] = found[1], int(found[2])
+        self._numbers = {call: i for i, call in enumerate(program.calls)}
+
+    # ---- What is done, in order -------------------------------------------------------------------
+
+    def items(self) -> list[_Item]:
+        """Return the statements in an order in which everything is known before it is used."""
+        done: set[int] = set()
+        items: list[_Item] = []
+        copies, copied = self._copies()
+        stores: dict[int, list[_Store]] = {}
+        for target, at, node in self._program.stores:
+            if (target, at) not in copied:
+                stores.setdefault(node, []).append(_Store(target, at, node))
+
+        def need(wanted: Iterable[int]) -> None:
+            todo, fresh = [k for k in wanted if k not in done], set()
+            while todo:
+                k = todo.pop()
+                if k not in done and k not in fresh:
+                    fresh.add(k)
+                    todo += self._nodes[k].operands
+            for k in sorted(fresh):
+                items.append(k)
+                items.extend(stores.pop(k, ()))
+            done.update(fresh)
+
+        for call in self._program.calls:
+            for argument in call.arguments:
+                if self._source(argument) is None:
+                    need(argument)
+            items.append(call)
+        need(node for _, at, node in self._program.stores if node in stores)
+        for each in stores.values():
+            items.extend(each)
+        return items + copies
+
+    def _copies(self) -> tuple[list[_Item], set[tuple[str, int]]]:
+        """Return the copies of whole runs of inputs or results into results, and which elements they fill."""
+        copies: list[_Item] = []
+        filled: set[tuple[str, int]] = set()
+        run: list[tuple[str, int, int]] = []
+
+        def close() -> None:
+            if len(run) >= _RUN:
+                (target, at, _), (source, start) = run[0], self._place[run[0][2]]
+                copies.append(_Copy(target, at, source, start, len(run)))
+                filled.update((target, i) for target, i, _ in run)
+            run.clear()
+
+        for store in sorted(self._program.stores):
+            if store[2] not in self._place:
+                close()
+                continue
+            if run:
+                (target, at, _), (source, start) = run[-1], self._place[run[-1][2]]
+                if (target, at + 1, (source, start + 1)) != (*store[:2], self._place[store[2]]):
+                    close()
+            run.append(store)
+        close()
+        return copies, filled
+
+    def _source(self, argument: tuple[int, ...]) -> tuple[str, int] | None:
+        """Return where an argument already lies as an array, if it does."""
+        places = [self._place.get(k) for k in argument]
+        if not places or places[0] is None:
+            return None
+        name, start = places[0]
+        return (name, start) if places == [(name, start + i) for i in range(len(places))] else None
+
+    def _is_table(self, argument: tuple[int, ...]) -> bool:
+        return len(argument) > 3 and all(self._nodes[k].code == ca.OP_CONST for k in argument)
+
+    # ---- The text of a statement ---------------------------------------------------------------------
+
+    def _constant(self, k: int) -> str:
+        # A bound beyond the largest float is met by every finite float and by no infinite one.
+        number = self._nodes[k].number
+        if self._real == "float" and k in self._compared and math.isfinite(number):
+            number = min(max(number, -LARGEST_FLOAT), LARGEST_FLOAT)
+        return c_constant(number, self._real)
+
+    def _number(self, k: int) -> str:
+        """Return the C of a scalar as a number."""
+        return f"(a{k} ? {self._one} : {self._zero})" if self._nodes[k].is_flag else f"a{k}"
+
+    def scalar(self, k: int, arrays: dict[str, int]) -> str:
+        """Return the declaration of a scalar."""
+        node = self._nodes[k]
+        if node.code == ca.OP_CONST:
+            text = self._constant(k)
+        elif node.code == ca.OP_INPUT:
+            text = _at(*self._place[k], arrays)
+        else:
+            text = expression(node, [self._nodes[i].is_flag for i in node.operands], self._maths, self._real)
+            text = text.format(*(f"a{i}" for i in node.operands))
+        return f"const {'gnc_flag' if node.is_flag else 'gnc_real'} a{k} = {text};"
+
+    def call(self, call: Call, arrays: dict[str, int]) -> list[str]:
+        """Return the statements of a call; `arrays` holds the places of arrays that are part of one large one."""
+        number, lines, given = self._numbers[call], [], []
+        for i, argument in enumerate(call.arguments):
+            name, source = f"c{number}_{i}", self._source(argument)
+            if source is not None:
+                given.append(_pointer(*source, arrays))
+                continue
+            if argument and not self._is_table(argument):
+                lines += [f"{_at(name, n, arrays)} = {self._number(k)};" for n, k in enumerate(argument)]
+            given.append(_pointer(name, 0, arrays) if argument else "0")
+        given += [_pointer(port.name, 0, arrays) if port.size else "0" for port in call.results]
+        given += ["status"] if call.callee.asks else []
+        return [*lines, f"{call.callee.name}({', '.join(given)});"]
+
+    def statement(self, item: _Item, arrays: dict[str, int]) -> list[str]:
+        """Return the C of one item."""
+        if isinstance(item, Call):
+            return self.call(item, arrays)
+        if isinstance(item, _Copy):
+            source = _pointer(item.source, item.start, arrays)
+            return [f"copy_numbers({item.count}, {source}, {_pointer(item.target, item.at, arrays)});"]
+        if isinstance(item, _Store):
+            return [f"{item.target}[{item.at}] = {self._number(item.node)};"]
+        return [self.scalar(item, arrays)]
+
+    def tables(self) -> list[str]:
+        """Return arguments of calls that are constants, as tables."""
+        lines = []
+        for call in self._program.calls:
+            for i, argument in enumerate(call.arguments):
+                if self._is_table(argument):
+                    values = ", ".join(self._constant(k) for k in argument)
+                    name = f"c{self._numbers[call]}_{i}"
+                    lines.append(f"static const gnc_real {name}[{len(argument)}] = {{{values}}};")
+        return lines
+
+    def arrays(self) -> list[Port]:
+        """Return the arrays that calls read and write and that are neither ports nor tables."""
+        found = []
+        for call in self._program.calls:
+            found += [
+                Port(f"c{self._numbers[call]}_{i}", len(argument))
+                for i, argument in enumerate(call.arguments)
+                if argument and self._source(argument) is None and not self._is_table(argument)
+            ]
+            found += [port for port in call.results if port.size]
+        return found
+
+    # ---- One function, or a row of them -----------------------------------------------------------------
+
+    def text(self) -> str:
+        """Return the C of the program."""
+        items = self.items()
+        head = declare(self._name, self._program.inputs, self._program.outputs, self._program.asks)
+        if len(items) <= LENGTH:
+            body = [f"gnc_real {port.name}[{port.size}];" for port in self.arrays()] + self.tables()
+            body += [line for item in items for line in self.statement(item, {})]
+            return _function(head, body, self._unused("\n".join(body)))
+        return self._pieces(head, items)
+
+    def _unused(self, body: str) -> list[str]:
+        names = [port.name for port in (*self._program.inputs, *self._program.outputs)]
+        names += ["status"] if self._program.asks else []
+        return [f"(void){name};" for name in names if not re.search(rf"\b{name}\b", body)]
+
+    def _pieces(self, head: str, items: list[_Item]) -> str:
+        rows = [items[i : i + LENGTH] for i in range(0, len(items), LENGTH)]
+        arrays: dict[str, int] = {}
+        room = 0
+        for port in self.arrays():
+            arrays[port.name] = room
+            room += port.size
+        slots, room = self._slots(rows, room)
+        tables = {text.split("[")[0].split()[-1]: text for text in self.tables()}
+        named = [(port.name, f"const gnc_real *{port.name}") for port in self._program.inputs]
+        named += [(port.name, f"gnc_real *{port.name}") for port in self._program.outputs]
+        named += [("w", "gnc_real *w"), ("status", "uint32_t *status")]
+        texts, body = [], [f"gnc_real w[{max(room, 1)}];"]
+        for number, row in enumerate(rows, 1):
+            lines = self._row(row, slots, arrays)
+            said = set(re.findall(r"\w+", "\n".join(lines)))
+            lines = [text for name, text in tables.items() if name in said] + lines
+            given = [(name, text) for name, text in named if name in said]
+            part = f"{self._name}_part{number}"
+            texts.append(_function(f"GNC_APART static void {part}({', '.join(text for _, text in given)})", lines, []))
+            body.append(f"{part}({', '.join(name for name, _ in given)});")
+        return "\n".join([*texts, _function(head, body, self._unused("\n".join(body)))])
+
+    def _slots(self, rows: list[list[_Item]], room: int) -> tuple[dict[int, int], int]:
+        """Return the place of each scalar that a later row uses, and the numbers of the whole array."""
+        home = {item: r for r, row in enumerate(rows) for item in row if isinstance(item, int)}
+        last: dict[int, int] = {}
+        for r, row in enumerate(rows):
+            for k in self._read(row):
+                if home[k] != r and self._nodes[k].code not in (ca.OP_CONST, ca.OP_INPUT):
+                    last[k] = r
+        free: list[int] = []
+        ending: dict[int, list[int]] = {}
+        slots: dict[int, int] = {}
+        for r, row in enumerate(rows):
+            for k in row:
+                if isinstance(k, int) and k in last:
+                    if free:
+                        slots[k] = heapq.heappop(free)
+                    else:
+                        slots[k], room = room, room + 1
+                    ending.setdefault(last[k], []).append(slots[k])
+            for slot in ending.pop(r, ()):
+                heapq.heappush(free, slot)
+        return slots, room
+
+    def _read(self, row: list[_Item]) -> set[int]:
+        """Return the scalars that a row reads."""
+        found: set[int] = set()
+        for item in row:
+            if isinstance(item, int):
+                found.update(self._nodes[item].operands)
+            elif isinstance(item, _Store):
+                found.add(item.node)
+            elif isinstance(item, Call):
+                for argument in item.arguments:
+                    if self._source(argument) is None and not self._is_table(argument):
+                        found.update(argument)
+        return found
+
+    def _row(self, row: list[_Item], slots: dict[int, int], arrays: dict[str, int]) -> list[str]:
+        """Return the statements of one function of a row: what it takes over, does and leaves."""
+        own = {item for item in row if isinstance(item, int)}
+        lines = []
+        for k in sorted(self._read(row) - own):
+            node = self._nodes[k]
+            if node.code in (ca.OP_CONST, ca.OP_INPUT):
+                lines.append(self.scalar(k, arrays))
+            else:
+                kept = f"w[{slots[k]}]{f' != {self._zero}' if node.is_flag else ''}"
+                lines.append(f"const {'gnc_flag' if node.is_flag else 'gnc_real'} a{k} = {kept};")
+        read = self._read(row) | slots.keys()
+        for item in row:
+            lines += self.statement(item, arrays) if not isinstance(item, int) or item in read else []
+        return lines + [f"w[{slots[k]}] = {self._number(k)};" for k in sorted(own) if k in slots]
+
+
+def _function(head: str, body: list[str], unused: list[str]) -> str:
+    return "\n".join([head, "{", *(f"    {line}" for line in (*unused, *body)), "}", ""])
+
+
+def _at(name: str, index: int, arrays: dict[str, int]) -> str:
+    return f"w[{arrays[name] + index}]" if name in arrays else f"{name}[{index}]"
+
+
+def _pointer(name: str, index: int, arrays: dict[str, int]) -> str:
+    return f"&{_at(name, index, arrays)}"
+
+
+def print_program(name: str, program: Program, *, maths: Math = "gnc", real: Real = "double") -> str:
+    """Return the C text of a program: `static void name(x0, x1, ..., y0, ... [, status])`.
+
+    Raises
+    ------
+    PrinterError
+        For an operation or a constant that has no C form.
+    """
+    try:
+        return _Printer(name, program, maths, real).text()
+    except PrinterError as error:
+        raise PrinterError(f"{name}: {error}") from None

@@ -1,0 +1,230 @@
+"""A CasADi function as scalars and calls: what of it is straight-line code, and what must stay a piece of its own.
+
+An SX function is scalars alone. Of an MX function all is made scalars that can be; its branches, maps, tables, splines,
+linear systems and functions that are used more than once become calls, with arrays in and out. Every scalar is
+computed once, in whatever order the calls allow.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from casadi_gnc.embedded.scalars import Node, graph
+from casadi_gnc.errors import PrinterError
+
+#: Most operations of one function; more is no flight code, and C of it takes hours to compile.
+MOST_OPERATIONS = 1_000_000
+#: What calls may add to a text by being written out; and a function that is smaller always is.
+WRITTEN_OUT, SMALL = 200, 25
+_REFUSED = {
+    ca.OP_GETNONZEROS_PARAM: "picks elements by a computed index",
+    ca.OP_SETNONZEROS_PARAM: "writes elements at a computed index",
+    ca.OP_ADDNONZEROS_PARAM: "adds to elements at a computed index",
+    ca.OP_FIND: "searches the first element that is not zero",
+    ca.OP_LOW: "searches an interval",
+    ca.OP_ASSERTION: "asserts something",
+    ca.OP_MONITOR: "prints what it sees",
+    ca.OP_DUMP: "writes to a file",
+    ca.OP_CONVEXIFY: "changes eigenvalues",
+}
+_ROOTS = "write a fixed number of Newton steps in CasADi symbols"
+_STEPS = 'take the "rk" integrator with the option simplify=True, or write the steps in CasADi symbols'
+_OUTSIDE = "its C is not CasADi's to print; call it beside the package, and pass what it gives"
+#: What to do about functions that are no expressions, by their class or what CasADi says that they are.
+_REMEDIES = {
+    "Nlpsol": "nonlinear programs have no bounded time on board; solve it on the ground, and pass what it gives",
+    "Conic": "state the problem as an allocation file, whose solver flies, or pass what it gives",
+    **dict.fromkeys(("Newton", "FastNewton", "KinsolInterface", "ImplicitToNlp"), _ROOTS),
+    **dict.fromkeys(("RungeKutta", "Collocation", "CvodesInterface", "IdasInterface"), _STEPS),
+    **dict.fromkeys(("External", "GenericExternal"), _OUTSIDE),
+    "CallbackInternal": "Python does not fly; write it in CasADi symbols, or pass what it gives",
+}
+
+
+@dataclass(frozen=True)
+class Port:
+    """Name an argument or a result of a function, with the numbers that it holds."""
+
+    name: str
+    size: int
+
+
+@dataclass(frozen=True)
+class Callee:
+    """Name a C function that was printed: `asks` whether its last argument is the status."""
+
+    name: str
+    asks: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Call:
+    """Call a C function: the scalars of each argument, and the array of each result."""
+
+    callee: Callee
+    arguments: tuple[tuple[int, ...], ...]
+    results: tuple[Port, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Hold a function as scalars and calls.
+
+    Parameters
+    ----------
+    inputs, outputs : the ports, nonzeros only.
+    nodes : scalars; those of code OP_INPUT have the place "array[index]" of an input or of a call's result.
+    stores : (output, element, scalar).
+    calls : in order.
+    """
+
+    inputs: tuple[Port, ...]
+    outputs: tuple[Port, ...]
+    nodes: list[Node]
+    stores: list[tuple[str, int, int]]
+    calls: list[Call] = field(default_factory=list)
+
+    @property
+    def asks(self) -> bool:
+        """Whether a call in it may have something to say in the status."""
+        return any(call.callee.asks for call in self.calls)
+
+
+def ports(function: ca.Function) -> tuple[tuple[Port, ...], tuple[Port, ...]]:
+    """Return the arguments and the results of a function, as nonzeros."""
+    inputs = tuple(Port(f"x{i}", function.nnz_in(i)) for i in range(function.n_in()))
+    return inputs, tuple(Port(f"y{i}", function.nnz_out(i)) for i in range(function.n_out()))
+
+
+def is_plain(function: ca.Function) -> bool:
+    """Tell whether a function is scalars alone: no branch, map, table or linear system in it or in what it calls."""
+    if function.is_a("SXFunction"):
+        return True
+    if not function.is_a("MXFunction"):
+        return False
+    for k in range(function.n_instructions()):
+        code = function.instruction_id(k)
+        if code == ca.OP_CALL:
+            if not is_plain(function.instruction_MX(k).which_function()):
+                return False
+        elif code == ca.OP_BSPLINE or code in _REFUSED or (code == ca.OP_SOLVE and not _is_triangular(function, k)):
+            return False
+    return True
+
+
+def _is_triangular(function: ca.Function, k: int) -> bool:
+    """Tell whether a linear system is solved by substitution, which is scalars."""
+    name = function.instruction_MX(k).class_name()
+    return "Triu" in name or "Tril" in name
+
+
+def expanded(function: ca.Function, place: str) -> ca.Function:
+    """Return a plain function in SX; raise `PrinterError` where CasADi cannot."""
+    if function.is_a("SXFunction"):
+        found = function
+    else:
+        try:
+            found = function.expand()
+        except RuntimeError as error:
+            node = re.search(r"not defined for (?:class )?(?:N6casadi\d+)?(\w+?)E?$", str(error).strip())
+            said = f"has a node {node[1]}" if node else f"is no scalars ({str(error).strip().splitlines()[-1][-200:]})"
+            raise PrinterError(f"{place} {said}, which has no C form here; write it in other operations") from None
+    return check_size(found, place)
+
+
+def check_size(function: ca.Function, place: str) -> ca.Function:
+    """Return the function; raise `PrinterError` where it has more operations than C of it could be compiled."""
+    if function.n_instructions() > MOST_OPERATIONS:
+        raise PrinterError(
+            f"{place} has {function.n_instructions()} operations, expected at most {MOST_OPERATIONS}; "
+            "write what repeats as a map, mapaccum or a function that is called"
+        )
+    return function
+
+
+def refuse(function: ca.Function, place: str) -> PrinterError:
+    """Return the error that says why a function cannot be printed, and what to do."""
+    name = function.class_name()
+    found = [text for kind, text in _REMEDIES.items() if name == kind or function.is_a(kind)]
+    remedy = found[0] if found else "write it in CasADi symbols"
+    return PrinterError(f"{place} is of kind {name.removesuffix('Internal')}, which has no C form here: {remedy}")
+
+
+#: What makes a C function of an instruction that is no scalar: (function, instruction, place) -> callee.
+Printed = Callable[[ca.Function, int, str], Callee]
+
+
+def program(function: ca.Function, place: str, is_kept: Callable[[ca.Function], bool], printed: Printed) -> Program:
+    """Return a function as scalars and calls.
+
+    Parameters
+    ----------
+    function : SX or MX.
+    place : where it is called, for messages: "controller, st_acc10".
+    is_kept : whether a plain function that is called stays a function.
+    printed : makes a C function of an instruction.
+
+    Raises
+    ------
+    PrinterError
+        For an operation that has no C form, and for functions that are too large.
+    """
+    inputs, outputs = ports(function)
+    if function.is_a("SXFunction"):
+        nodes, stores = _scalars(check_size(function, place), inputs, outputs)
+        return Program(inputs, outputs, nodes, stores)
+    if not function.is_a("MXFunction"):
+        raise refuse(function, place)
+    given = function.mx_in()
+    results = function.call(given, True, False)
+    flat = ca.Function("flat", given, results)
+    cut, names, arguments, callees, arrays = [], [], [], [], []
+    for k in range(flat.n_instructions()):
+        pieces = _piece(flat, k, place, is_kept)
+        if pieces is None:
+            continue
+        node = flat.instruction_MX(k)
+        callees.append(printed(flat, k, place))
+        arguments.append([node.dep(i) for i in range(node.n_dep())])
+        arrays.append(tuple(Port(f"r{len(arrays)}_{i}", piece.nnz()) for i, piece in enumerate(pieces)))
+        cut += pieces
+        names += [ca.MX.sym(port.name, piece.sparsity()) for port, piece in zip(arrays[-1], pieces, strict=True)]
+    flatter = [each for one in arguments for each in one]
+    whole = ca.graph_substitute([*results, *flatter], cut, names) if cut else [*results, *flatter]
+    sx = expanded(ca.Function(function.name(), [*given, *names], whole), place)
+    wanted = [tuple(Port(f"c{k}_{i}", one.nnz()) for i, one in enumerate(each)) for k, each in enumerate(arguments)]
+    nodes, stores = _scalars(sx, [*inputs, *sum(arrays, ())], [*outputs, *sum(wanted, ())])
+    found = {(port, i): node for port, i, node in stores}
+    calls = [
+        Call(callee, tuple(tuple(found[port.name, i] for i in range(port.size)) for port in each), array)
+        for callee, each, array in zip(callees, wanted, arrays, strict=True)
+    ]
+    own = {port.name for port in outputs}
+    return Program(inputs, outputs, nodes, [one for one in stores if one[0] in own], calls)
+
+
+def _piece(function: ca.Function, k: int, place: str, is_kept: Callable[[ca.Function], bool]) -> list[ca.MX] | None:
+    """Return the results of an instruction that stays a call; None where it is scalars."""
+    code, node = function.instruction_id(k), function.instruction_MX(k)
+    if code in _REFUSED:
+        raise PrinterError(f"{place}: a node {_REFUSED[code]}, which has no C form here; rewrite it without")
+    if code == ca.OP_CALL:
+        called = node.which_function()
+        if is_plain(called) and not is_kept(called):
+            return None
+        return [node.get_output(i) for i in range(node.n_out())]
+    is_piece = code == ca.OP_BSPLINE or (code == ca.OP_SOLVE and not _is_triangular(function, k))
+    return [node] if is_piece else None
+
+
+def _scalars(
+    function: ca.Function, inputs: Sequence[Port], outputs: Sequence[Port]
+) -> tuple[list[Node], list[tuple[str, int, int]]]:
+    given = {function.name_in(i): [f"{p.name}[{n}]" for n in range(p.size)] for i, p in enumerate(inputs)}
+    told = {function.name_out(i): [f"{p.name} {n}" for n in range(p.size)] for i, p in enumerate(outputs)}
+    nodes, results = graph(function, {**given, **told})
+    return nodes, [(place.split()[0], int(place.split()[1]), node) for place, node in results]
