@@ -2,6 +2,7 @@
 
 from casadi_gnc.laws._law import Law, gain, gains_of, option
 from casadi_gnc.laws.attitude_pd import AttitudePD
+from casadi_gnc.laws.bdot import BDot
 from casadi_gnc.laws.braking_limiter import BrakingLimiter
 from casadi_gnc.laws.command_filter import CommandFilter
 from casadi_gnc.laws.detumble import Detumble
@@ -10,10 +11,13 @@ from casadi_gnc.laws.drag_free import DragFree
 from casadi_gnc.laws.efforts import FORCE, FORCE_AND_TORQUE, TORQUE
 from casadi_gnc.laws.finite_time_fault_tolerant import FiniteTimeFaultTolerant
 from casadi_gnc.laws.intermediate_observer import IntermediateObserver
+from casadi_gnc.laws.modes import Modes
+from casadi_gnc.laws.mrp_feedback import MrpFeedback
 from casadi_gnc.laws.performance_funnel import PerformanceFunnel
 from casadi_gnc.laws.position_disturbance_observer import PositionDisturbanceObserver
 from casadi_gnc.laws.prescribed_performance import PrescribedPerformance
 from casadi_gnc.laws.proximity_tracking import ProximityTracking
+from casadi_gnc.laws.quaternion_feedback import QuaternionFeedback
 from casadi_gnc.laws.rate_damping import RateDamping
 from casadi_gnc.laws.sampling import advance
 from casadi_gnc.laws.saturation_compensator import SaturationCompensator
@@ -35,6 +39,10 @@ REGISTRY = Registry(
         "finite_time_fault_tolerant": f"{__name__}.finite_time_fault_tolerant:FiniteTimeFaultTolerant",
         "proximity_tracking": f"{__name__}.proximity_tracking:ProximityTracking",
         "drag_free": f"{__name__}.drag_free:DragFree",
+        "mrp_feedback": f"{__name__}.mrp_feedback:MrpFeedback",
+        "quaternion_feedback": f"{__name__}.quaternion_feedback:QuaternionFeedback",
+        "bdot": f"{__name__}.bdot:BDot",
+        "modes": f"{__name__}.modes:Modes",
     },
     is_one=lambda thing: isinstance(thing, type) and issubclass(thing, Law),
     expected="a class derived from casadi_gnc.Law",
@@ -46,6 +54,7 @@ __all__ = [
     "REGISTRY",
     "TORQUE",
     "AttitudePD",
+    "BDot",
     "BrakingLimiter",
     "CommandFilter",
     "Detumble",
@@ -54,10 +63,13 @@ __all__ = [
     "FiniteTimeFaultTolerant",
     "IntermediateObserver",
     "Law",
+    "Modes",
+    "MrpFeedback",
     "PerformanceFunnel",
     "PositionDisturbanceObserver",
     "PrescribedPerformance",
     "ProximityTracking",
+    "QuaternionFeedback",
     "RateDamping",
     "SaturationCompensator",
     "TwoObserverAttitude",

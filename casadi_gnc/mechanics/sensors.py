@@ -42,7 +42,7 @@ class Sensor:
     Parameters
     ----------
     name : prefix of its signals.
-    hold : base period of the flight, [s], as a mission sets it; until then, 0.
+    hold : base period of the flight, [s], as a mission sets it; until then 0, and no random walk.
     period : between two of its values, [s], a whole multiple of `hold`; 0: `hold`.
     dropout : chance that a value which is due does not come, 0 to below 1.
     """
@@ -67,10 +67,8 @@ class Sensor:
         return max(1, round(self.period / self.hold)) if self.hold else 1
 
     def density(self, walk: float) -> Any:
-        """Return walk/sqrt(h), what a random walk makes of a normal number that is held over a sample."""
-        if walk and not self.hold:
-            raise FlightError(f"{self.name}: noise needs a sample period; fly in mode sampled")
-        return walk / exact.sqrt(self.hold) if walk else 0.0
+        """Return walk/sqrt(h), what a random walk makes of a normal number held over a sample; 0 before h is known."""
+        return walk / exact.sqrt(self.hold) if self.hold else 0.0
 
     @property
     def is_partial(self) -> bool:

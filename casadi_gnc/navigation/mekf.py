@@ -29,7 +29,7 @@ A direction is linear in small errors only: what is left out is of the size of a
 of the variance (trace P_aa/2)^2, which vanishes as the filter settles (underweighting).
 
 Source: Lefferts, Markley, Shuster (1982), doi:10.2514/3.56190; Markley (2003), doi:10.2514/2.5048;
-underweighting: Zanetti, DeMars, Bishop (2010), doi:10.2514/1.50596.
+underweighting: Zanetti, DeMars, Bishop, Journal of Guidance, Control, and Dynamics 33 (2010), 1670-1675.
 """
 
 from __future__ import annotations

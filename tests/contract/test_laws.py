@@ -33,7 +33,10 @@ def y(name):
     mission, scheme = flown_by()[name]
     quiet = ca.DM.zeros(mission.truth.noise.size)
     measured = ca.DM(mission.truth.measure(0.0, ca.DM(mission.start), quiet))
-    return ca.DM(Loop(mission, scheme).seen(measured))
+    seen = ca.DM(Loop(mission, scheme).seen(measured))
+    if scheme.navigation is None:
+        return seen
+    return ca.DM(scheme.flown.read(0.0, seen, ca.DM(scheme.flown.start(0.0, seen))))
 
 
 def test_sizes_fit_the_layouts(name, law, y):

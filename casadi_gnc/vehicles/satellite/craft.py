@@ -1,14 +1,15 @@
 """A satellite by tables: a rigid body in [spacecraft], and a table for each thing that it carries.
 
 Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]]; [orbit],
-[field], [environment]; [truth], [initial]; [[reference]]. A class derived from this one adds parts of its own in
-`components`.
+[field], [environment]; [[sensor]], [estimator]; [[reference]]; [truth], [initial]. A class derived from this one adds
+parts of its own in `components`.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -17,28 +18,34 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from casadi_gnc.checks import Check
-from casadi_gnc.errors import FlightError
+from casadi_gnc.errors import FlightError, LawError
 from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.mechanics import quaternions
+from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.mechanics.multibody import Assembly, Component
 from casadi_gnc.mechanics.reaction_wheels import TorqueGyrostat, WheelArray
 from casadi_gnc.mechanics.rigid_body import RigidBody
+from casadi_gnc.mechanics.sensors import Sensor
 from casadi_gnc.missions.actuation import Actuators
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.scheme import Scheme
-from casadi_gnc.navigation import AttitudeNavigation, Reference
+from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
+from casadi_gnc.signals import Layout
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, table
 
 from . import part_tables
 from .attitude_tables import InitialAttitude
+from .estimator_tables import AnyEstimator
 from .on_board import TorqueByField, WheelLimits
 from .orbit_tables import Environment, FieldTable, OrbitTable
 from .part_tables import FlexibleModeTable, MagnetorquerTable, SloshTable, ThrusterTable, WheelTable
 from .plant import Satellite
-from .surroundings import Surroundings
+from .reference_tables import AnyReference, timeline
+from .sensor_tables import AnySensor, made
+from .surroundings import SunDirection, Surroundings
 
 #: Smallest over largest singular value of the effectiveness below which an axis is left out.
 _FLAT = 1e-9
@@ -70,6 +77,9 @@ class SatelliteCraft(Craft):
     orbit: OrbitTable | None = table(None)
     field: FieldTable | None = table(None)
     environment: Environment = table(Environment())
+    sensor: list[AnySensor] = table([], "a sensor; there may be several")
+    estimator: AnyEstimator | None = table(None)
+    reference: list[AnyReference] = table([], "where to point; there may be several, one after another")
     truth: Truth = table(Truth())
     initial: InitialAttitude = table(InitialAttitude())
 
@@ -84,12 +94,17 @@ class SatelliteCraft(Craft):
         if self.field is not None:
             self._field()
         self._turning()
+        self.pointed()
+        self._estimator()
         return self
+
+    def _when(self) -> Epoch | None:
+        return None if self.orbit is None else self.orbit.when()
 
     def _field(self) -> Any:
         """Return the magnetic field; raise `MisfitError` where the orbit does not say where and when."""
         assert self.field is not None
-        epoch = None if self.orbit is None else self.orbit.when()
+        epoch = self._when()
         if epoch is None:
             raise MisfitError("needs to know where and when; give [orbit] with an epoch", "field")
         try:
@@ -148,11 +163,30 @@ class SatelliteCraft(Craft):
         if self.orbit is None:
             return Surroundings()
         field = None if self.field is None else self._field().at
-        return Surroundings(self.orbit.gravity(), self.environment.gravity_gradient, field=field)
+        return Surroundings(self.orbit.gravity(), self.environment.gravity_gradient, field=field, sun=self._sun())
+
+    def _sun(self) -> SunDirection | None:
+        epoch = self._when()
+        return None if epoch is None else SunDirection(epoch)
 
     def pointed(self) -> Reference:
         """Return where the satellite should point."""
-        return Reference()
+        return timeline(self.reference, self._when(), has_orbit=self.orbit is not None)
+
+    def _sensors(self) -> tuple[Sensor, ...]:
+        return made(self.sensor, len(self.wheel), has_field=self.field is not None, has_sun=self._when() is not None)
+
+    def _estimator(self) -> Estimator | None:
+        sensors = self._sensors()
+        if self.estimator is None:
+            return None
+        field = None if self.field is None else self._field()
+        if field is not None and self.estimator.field_degree is not None:
+            field = replace(field, degree=self.estimator.field_degree)
+        try:
+            return self.estimator.estimator(sensors, None if field is None else field.at, self._sun())
+        except (LawError, ValueError) as error:
+            raise MisfitError(str(error), "estimator") from None
 
     def plant(self) -> Satellite:
         """Return the truth."""
@@ -162,7 +196,9 @@ class SatelliteCraft(Craft):
             self.surroundings(),
             self.environment.disturbance(),
             self.rate_limit_rad_per_s,
-            reference=self.pointed(),
+            self._sensors(),
+            self.estimator is not None,
+            self.pointed(),
         )
 
     def start(self) -> dict[str, Any]:
@@ -179,7 +215,8 @@ class SatelliteCraft(Craft):
             turned = quaternions.compose(turned, wanted.quaternion)
         parts = {name: value for part in self.components() for name, value in part.start().items()}
         mrp = quaternions.to_mrp(turned)
-        first = {"mrp": mrp, "rate": rate, **parts, **place}
+        sensed = {name: value for sensor in self._sensors() for name, value in sensor.start().items()}
+        first = {"mrp": mrp, "rate": rate, **parts, **place, **sensed}
         return {name: array(value).elements() for name, value in first.items()}
 
     def belief(self) -> RigidBody:
@@ -194,9 +231,11 @@ class SatelliteCraft(Craft):
 
     def navigation(self) -> AttitudeNavigation:
         """Return what laws read: attitude relative to the reference, and what else is measured."""
-        measured = self.plant().measurement
-        passed = tuple(signal for signal in measured.signals if signal.name not in ("mrp", "rate"))
-        return AttitudeNavigation(reference=self.pointed(), passed=type(measured)(passed))
+        measured, estimator = self.plant().measurement, self._estimator()
+        # What the filter alone reads, laws need not see.
+        own = set() if estimator is None else set(estimator.inputs.names) - {"magnetic_field", "position"}
+        passed = tuple(signal for signal in measured.signals if signal.name not in {"mrp", "rate", *own})
+        return AttitudeNavigation(estimator=estimator, reference=self.pointed(), passed=Layout(passed))
 
     def actuators(self) -> Actuators:
         """Return wheels, thrusters and coils as known."""
@@ -229,9 +268,11 @@ class SatelliteCraft(Craft):
 
     def regulated(self, mission: Mission) -> dict[str, list[float]]:
         """Return the attitude of a reference that stays, and rest; of one that moves, nothing."""
-        if type(self.pointed()) is not Reference:
+        pointed = self.pointed()
+        if type(pointed) not in (Reference, Inertial):
             return {}
-        return {"mrp": [0.0] * 3, "rate": [0.0] * 3}
+        still = array(pointed.at(0.0, None).quaternion)
+        return {"mrp": quaternions.to_mrp(still).elements(), "rate": [0.0] * 3}
 
     def panels(self, mission: Mission) -> tuple[Panel, ...]:
         """Return pointing, rate, torque, and what makes it."""

@@ -25,6 +25,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.errors import FlightError
 from casadi_gnc.mechanics import attitude, quaternions
 from casadi_gnc.mechanics.disturbances import Harmonics
 from casadi_gnc.mechanics.multibody import Assembly
@@ -67,7 +68,9 @@ class Satellite(Plant):
     reference: Reference = field(default_factory=Reference)
 
     def timed(self, hold: float) -> Satellite:
-        """Return the satellite whose sensors know the sample period [s]."""
+        """Return the satellite whose sensors know the sample period [s]; raise `FlightError` where there is none."""
+        if self.sensors and not hold:
+            raise FlightError(f"{self.sensors[0].name} is a sensor that is sampled; fly in mode sampled")
         return replace(self, sensors=tuple(replace(sensor, hold=hold) for sensor in self.sensors))
 
     @cached_property

@@ -9,9 +9,22 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.mechanics import attitude, quaternions
+from casadi_gnc.mechanics import attitude, earth, quaternions
 from casadi_gnc.mechanics.circular_orbit import EARTH_MU
+from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.signals import Layout, Signal
+
+
+@dataclass(frozen=True)
+class SunDirection:
+    """Give the unit vector to the sun, (3,), inertial, at a time [s] after an epoch."""
+
+    epoch: Epoch
+
+    def __call__(self, t: Any) -> Any:
+        """Return the direction."""
+        direction = self.epoch.sun(t)[0]
+        return direction / ca.sqrt(ca.sumsqr(direction))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +65,8 @@ class Surroundings:
         if self.field is not None:
             more["magnetic_field"] = ca.mtimes(turn, self.field(t, now.position))
         if self.sun is not None:
-            more["sun"] = ca.mtimes(turn, self.sun(t))
+            sun = self.sun(t)
+            more["sun"], more["sunlight"] = ca.mtimes(turn, sun), earth.sunlight(now.position, sun)
         return SimpleNamespace(**vars(now), **more)
 
     def torque(self, now: Any, inertia: Any) -> Any:
