@@ -13,7 +13,10 @@ from casadi_gnc.checks import Check
 from casadi_gnc.mathematics import exact
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.tables.disturbances import OrbitAndTorque
 
+#: Angle [rad] by which a frame may turn in a flight and still be taken to stand.
+_STANDS = 0.01
 #: Largest condition number of the effectiveness that is no nuisance.
 _WELL_CONDITIONED = 100.0
 
@@ -71,6 +74,21 @@ def triangle(name: str, inertia: np.ndarray) -> Check:
         "smallest principal moment, and the two smaller less the largest, over the largest",
         at_least=True,
     )
+
+
+def orbit_frame(environment: OrbitAndTorque, duration: float) -> Iterator[Check]:
+    """Yield the angle by which the orbit frame turns in a flight [s] under an attitude that takes it to stand."""
+    if environment.frame_rate == 0:
+        yield Check(
+            "geometry.orbit_frame",
+            environment.orbit_rate_rad_per_s * duration,
+            _STANDS,
+            "rad",
+            "note",
+            "The attitude is told from the orbit frame as it is at t = 0; the real one turns away under the flight.",
+            'Add environment.corrected = ["orbit_frame_rate"] where the attitude is meant to follow the orbit.',
+            "orbit rate times duration",
+        )
 
 
 def rotation(name: str, matrix: Any, consequence: str, remedy: str) -> Check:

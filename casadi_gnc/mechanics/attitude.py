@@ -66,6 +66,20 @@ def reference_z(s: Any) -> Any:
     return ca.vertcat(x, y, z) / (1 + n) ** 2
 
 
+def orbit_frame_rate(s: Any, orbit_rate: Any) -> Any:
+    """Return the rate of the orbit frame, (3,), [rad/s], seen from the body.
+
+    Axes of the orbit frame as in Huang and Duan (2019), section II.A: x ahead, y along the orbit's normal, z away
+    from the Earth; it turns about its y axis.
+
+    Parameters
+    ----------
+    s : MRPs of the body with respect to the orbit frame.
+    orbit_rate : of a circular orbit, [rad/s].
+    """
+    return orbit_rate * dcm(s)[:, 1]
+
+
 def shadow(s: Any) -> Any:
     """Return the other MRPs of the same attitude, -s/n; undefined at s = 0."""
     return -s / ca.sumsqr(s)

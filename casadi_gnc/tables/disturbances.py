@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from casadi_gnc.mechanics.disturbances import Harmonics, OrbitalDisturbance
@@ -20,8 +22,18 @@ class OrbitAndTorque(Part):
     """What acts from outside: gravity at the orbital rate, and torques."""
 
     orbit_rate_rad_per_s: NonNegative = 0.0
+    corrected: list[Literal["orbit_frame_rate"]] = Field(
+        default=[],
+        description="errata of the truth that are corrected; orbit_frame_rate: the orbit frame, from which the "
+        "attitude counts, turns. Left out, as the papers have it, it stands as at t = 0",
+    )
     constant_torque_N_m: Vector = [0.0, 0.0, 0.0]
     harmonic: list[HarmonicTorque] = []
+
+    @property
+    def frame_rate(self) -> float:
+        """Rate [rad/s] at which the frame of the attitude turns about its y axis."""
+        return self.orbit_rate_rad_per_s if "orbit_frame_rate" in self.corrected else 0.0
 
     def disturbance(self) -> Harmonics:
         """Return the torque that acts besides gravity."""

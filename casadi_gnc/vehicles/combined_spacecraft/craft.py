@@ -15,6 +15,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from casadi_gnc.allocation import AllocationProblem
+from casadi_gnc.checking import geometry
+from casadi_gnc.checks import Check
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry
@@ -23,6 +25,7 @@ from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.scene import Arrow, Jets, Scene
+from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.attitude import AttitudeStart
 from casadi_gnc.tables.disturbances import OrbitAndTorque
@@ -98,6 +101,7 @@ class CombinedSpacecraftCraft(Craft, Orientation):
             real.thrusters.effectiveness,
             self.environment.disturbance(),
             self.rate_limit_rad_per_s,
+            self.environment.frame_rate,
         )
 
     def start(self) -> dict[str, list[float]]:
@@ -169,6 +173,10 @@ class CombinedSpacecraftCraft(Craft, Orientation):
             ),
             arrows=(Arrow("rate", "rate"), Arrow("achieved", "torque of the thrusters")),
         )
+
+    def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
+        """Yield how far the frame of the attitude ought to turn, where it does not."""
+        yield from geometry.orbit_frame(self.environment, mission.timing.duration)
 
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether the thrusters leave an axis out."""

@@ -3,7 +3,7 @@
 ========  ==========================================================================
 symbol    meaning
 ========  ==========================================================================
-sigma     attitude MRPs of the combined body with respect to the orbit frame, (3,)
+sigma     attitude MRPs of the combined body with respect to the orbit frame of t = 0, (3,)
 omega     rate, (3,), [rad/s], combined body frame
 F         thruster forces, (N,), [N]
 A_c       true effectiveness, 3 x N, [m]
@@ -13,6 +13,10 @@ d(t)      disturbance torque, (3,), [N m]
 
     sigma' = G(sigma) omega                                                             (1)
     J omega' = -omega x J omega + A_c F + u_t + u_g(sigma) + d(t)                       (14)
+
+The papers call it the orbit frame, which turns, and leave its rate out of (1): so sigma is relative to where that frame
+was at t = 0, and u_g has a vertical that stands still. With `frame_rate` (erratum `orbit_frame_rate`) it does turn,
+sigma' = G(sigma) (omega - R(sigma) w_o).
 
 Source: Huang, Biggs, Duan (2020), section 2, doi:10.1016/j.ast.2019.105572.
 """
@@ -24,7 +28,7 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mathematics.exact import array, is_zero
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.disturbances import Harmonics
 from casadi_gnc.mechanics.rigid_body import RigidBody
@@ -44,12 +48,14 @@ class CombinedSpacecraft(Plant):
     effectiveness : true A_c, (3, N), [m].
     disturbance : d(t).
     rate_limit : rate [rad/s] per axis beyond which a rate measurement cannot be true.
+    frame_rate : of the frame of the attitude about its y axis, [rad/s]; 0 as printed.
     """
 
     body: RigidBody
     effectiveness: ca.DM
     disturbance: Harmonics = Harmonics()
     rate_limit: float = 10.0
+    frame_rate: Any = 0.0
 
     @property
     def state(self) -> Layout:
@@ -79,8 +85,11 @@ class CombinedSpacecraft(Plant):
         """Return x' (eqs 1 and 14)."""
         now = self.state.split(x)
         torque = self.torque(actuators) + self.disturbance.at(t)
+        relative = now.rate
+        if not is_zero(self.frame_rate):
+            relative = relative - attitude.orbit_frame_rate(now.mrp, self.frame_rate)
         return self.state.pack(
-            mrp=attitude.mrp_rate(now.mrp, now.rate),
+            mrp=attitude.mrp_rate(now.mrp, relative),
             rate=self.body.acceleration(now.mrp, now.rate, torque),
         )
 

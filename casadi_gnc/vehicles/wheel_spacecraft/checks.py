@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
 
 def checks(craft: WheelSpacecraftCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield the wheels' frame, their speed, and whether one weight bears errors and faults."""
+    """Yield the frames of attitude and wheels, the wheels' speed, and whether one weight bears errors and faults."""
+    yield from geometry.orbit_frame(craft.environment, mission.timing.duration)
     points = craft.wheels.as_points
     if points is not None:
         yield geometry.rotation(

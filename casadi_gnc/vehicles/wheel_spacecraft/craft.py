@@ -99,6 +99,7 @@ class WheelSpacecraftCraft(Craft, Orientation):
             attitude_error=SensorError(sensors.mrp_deviation, sensors.mrp_factor_deviation),
             rate_error=SensorError(sensors.rate_deviation_rad_per_s, sensors.rate_factor_deviation),
             rate_limit=self.rate_limit_rad_per_s,
+            frame_rate=self.environment.frame_rate,
         )
 
     def start(self) -> dict[str, list[float]]:

@@ -3,7 +3,7 @@
 ==========  ========================================================================
 symbol      meaning
 ==========  ========================================================================
-sigma       attitude MRPs with respect to the orbit frame, (3,)
+sigma       attitude MRPs with respect to the orbit frame of t = 0, (3,)
 omega       rate, (3,), [rad/s], body frame
 Omega       wheel speeds, (N,), [rad/s]
 x           wheel accelerations as commanded, (N,), [rad/s^2]
@@ -14,6 +14,10 @@ d(t)        disturbance torque, (3,), [N m]
     sigma' = G(sigma) omega                                                             (1)
     J omega' = -omega x (J omega + C J_w Omega) + tau + u_g(sigma) + d(t)              (14)
     tau = -C J_w Omega',     Omega' = x                                          (11), (13)
+
+The papers call it the orbit frame, which turns, and leave its rate out of (1): so sigma is relative to where that frame
+was at t = 0, and u_g has a vertical that stands still. With `frame_rate` (erratum `orbit_frame_rate`) it does turn,
+sigma' = G(sigma) (omega - R(sigma) w_o).
 
 tau is the torque on the body; the paper's u is -tau. Faults act on the wheels (eq. 20: Omega' is
 what a faulty wheel makes of x) or, as the paper's section IV has it, on the three torques after the
@@ -83,6 +87,7 @@ class WheelSpacecraft(Plant):
     axis_faults, wheel_faults : on the three torques, [N m], and on the N wheels, [rad/s^2].
     attitude_error, rate_error : of the sensors.
     rate_limit : rate [rad/s] per axis beyond which a rate measurement cannot be true.
+    frame_rate : of the frame of the attitude about its y axis, [rad/s]; 0 as printed.
     """
 
     body: Gyrostat
@@ -92,6 +97,7 @@ class WheelSpacecraft(Plant):
     attitude_error: SensorError = SensorError()
     rate_error: SensorError = SensorError()
     rate_limit: float = 10.0
+    frame_rate: Any = 0.0
 
     @property
     def _count(self) -> int:
@@ -169,8 +175,11 @@ class WheelSpacecraft(Plant):
         acceleration = self.acceleration(t, now.wheel_speed, actuators)
         torque = self.torque(t, acceleration) + self.disturbance.at(t)
         torque += self.body.coupling(now.rate, now.wheel_speed)
+        relative = now.rate
+        if not is_zero(self.frame_rate):
+            relative = relative - attitude.orbit_frame_rate(now.mrp, self.frame_rate)
         return self.state.pack(
-            mrp=attitude.mrp_rate(now.mrp, now.rate),
+            mrp=attitude.mrp_rate(now.mrp, relative),
             rate=self.body.acceleration(now.mrp, now.rate, torque),
             wheel_speed=acceleration,
         )
