@@ -10,6 +10,7 @@ import typer
 
 if TYPE_CHECKING:
     from casadi_gnc.checks import Check
+    from casadi_gnc.problem_files.checking import Checked
 
 
 def check(
@@ -17,11 +18,20 @@ def check(
     scheme: Annotated[list[str] | None, typer.Option(help="Only this scheme; may be repeated.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the margins into this file (.png or .svg).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
+    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
     from casadi_gnc.checks import worst
+    from casadi_gnc.reports.style import check_page
 
-    title, found = _checked(problem, scheme)
+    if report is not None:
+        check_page(report)
+    checked = _checked(problem, scheme)
+    title, found = checked.title, checked.checks
+    if report is not None:
+        from casadi_gnc.reports.check_page import of_checks
+
+        of_checks(title, found, report, checked.mission)
     if plot is not None:
         from casadi_gnc.reports.check_picture import draw
 
@@ -30,24 +40,26 @@ def check(
         _print_json(title, found)
     else:
         _print(title, found, plot)
+        if report is not None:
+            typer.echo(f"wrote {report}")
     if worst(found) == "fail":
         raise typer.Exit(1)
 
 
-def _checked(problem: str, schemes: list[str] | None) -> tuple[str, list[Check]]:
-    """Return title and checks; of a synthesis within its time limit."""
+def _checked(problem: str, schemes: list[str] | None) -> Checked:
+    """Return what is found; of a synthesis within its time limit."""
     from casadi_gnc.cli.synthesize import TIME_LIMIT
     from casadi_gnc.errors import ProblemError
-    from casadi_gnc.problem_files.checking import check_file
+    from casadi_gnc.problem_files.checking import checked_file
     from casadi_gnc.problem_files.document import read
 
     document = read(problem)
     if document.data.get("kind") != "synthesis":
-        return check_file(problem, schemes)
+        return checked_file(problem, schemes)
     from casadi_gnc.system.processes import within
 
     try:
-        return within(TIME_LIMIT, check_file, problem)
+        return within(TIME_LIMIT, checked_file, problem)
     except TimeoutError:
         message = f"cannot be checked within {TIME_LIMIT:g} s; `casadi-gnc synthesize --time-limit` takes longer"
         raise ProblemError(message, document.path.name) from None

@@ -9,12 +9,16 @@ import typer
 
 
 def report(
-    what: Annotated[str, typer.Argument(help="A folder that `casadi-gnc fly` wrote.")],
+    what: Annotated[str, typer.Argument(help="A folder of flights, or a problem to check.")],
     out: Annotated[Path, typer.Option(help="The page to write.")] = Path("report.html"),
 ) -> None:
     """Write one HTML page that needs nothing else: it works from disk, offline, and says what it lacks.
 
-    Example: casadi-gnc report out/detumble --out detumble.html
+    Examples
+    --------
+    casadi-gnc report out/detumble --out detumble.html
+
+    casadi-gnc report huang2020/detumble --out checks.html
     """
     from casadi_gnc.reports.writing import write_report
 

@@ -77,7 +77,7 @@ def judged(flown: Flown) -> Verdict:
         sentences.append("The mission states no requirement: what is below is measured, not judged.")
     if broken:
         word = "Fails" if len(broken) == len(known) else f"{len(broken)} of {len(known)} schemes fail"
-        sentences += [f"{name} fails: {_and(why)}." for name, why in failing.items() if why]
+        sentences += [f"{name} fails: {listed(why)}." for name, why in failing.items() if why]
         return Verdict("bad", word, sentences, looks)
     if not known:
         return Verdict("warn", "Not judged", [*sentences, "No summary was kept, so nothing can be judged."], looks)
@@ -96,7 +96,7 @@ def _flew(flown: Flown) -> str:
     ends = [float(record.time[-1]) for record in flown.records if record.signals]
     span = f" for {max(ends):g} s" if ends else ""
     what = "One scheme flew" if len(names) == 1 else f"{len(names)} schemes flew"
-    return f"{what}{span}: {_and(names)}."
+    return f"{what}{span}: {listed(names)}."
 
 
 def _failed(record: Record) -> list[str]:
@@ -144,7 +144,7 @@ def _joined(looks: list[Look]) -> list[Look]:
     return sorted(joined, key=lambda look: ("bad", "warn", "note").index(look.gravity))
 
 
-def _and(names: list[str]) -> str:
+def listed(names: list[str]) -> str:
     """Return names as a sentence lists them; with semicolons where a name has a comma."""
     if any("," in name for name in names[1:]) or ("," in names[0] and len(names) > 1):
         return f"{'; '.join(names[:-1])}; and {names[-1]}"

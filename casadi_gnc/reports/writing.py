@@ -11,18 +11,29 @@ from casadi_gnc.tables.wording import cut
 
 
 def write_report(what: str | Path, target: str | Path) -> Path:
-    """Write the page of what a path leads to; return the page's path.
+    """Write the page of what a path or a name leads to; return the page's path.
+
+    Parameters
+    ----------
+    what : a folder that `casadi-gnc fly` wrote, a mission or synthesis file, or the name of a shipped one.
+    target : the page.
 
     Raises
     ------
-    ReportError
+    GncError
         Where there is nothing of which a page can be made.
     """
     page, source = Path(target), Path(what)
     check_page(page)
-    if source.is_dir() and records.is_flight_folder(source):
-        return flight_page.of_folder(source, page)
-    raise ReportError(
-        f"{cut(str(what), 200)!r} is no folder with flights; expected one that `casadi-gnc fly PROBLEM --out FOLDER` "
-        "wrote"
-    )
+    if source.is_dir():
+        if records.is_flight_folder(source):
+            return flight_page.of_folder(source, page)
+        raise ReportError(
+            f"{cut(str(what), 200)!r} is no folder with flights; expected one that `casadi-gnc fly PROBLEM --out "
+            "FOLDER` wrote"
+        )
+    from casadi_gnc.problem_files.checking import checked_file
+    from casadi_gnc.reports import check_page as checks
+
+    found = checked_file(what)
+    return checks.of_checks(found.title, found.checks, page, found.mission)
