@@ -25,7 +25,7 @@ class FormatChoice(str, Enum):
 
 def generate(
     problem: Annotated[
-        str, typer.Argument(help="A mission file or the name of a shipped one; a .casadi file of a function.")
+        str, typer.Argument(help="A mission or allocation file, or the name of a shipped one; a .casadi file.")
     ],
     out: Annotated[
         Path | None, typer.Option(help="Folder of the package, or the .fmu; flight/<name> if left out.")
@@ -45,6 +45,9 @@ def generate(
     ports: Annotated[
         Path | None, typer.Option(help="Of a function: TOML with a table a port: unit, note, initial (of a state).")
     ] = None,
+    commands: Annotated[
+        Path | None, typer.Option(help="Of an allocation file: CSV of the shipped commands, columns u1, u2, ...")
+    ] = None,
     rate: Annotated[float | None, typer.Option(help="Of a function: steps a second.")] = None,
     vectors: Annotated[
         Path | None, typer.Option(help="Of a function: CSV of the inputs of the shipped steps, columns x[0], x[1], ...")
@@ -60,8 +63,8 @@ def generate(
     if format is FormatChoice.fmu:
         from casadi_gnc.delivery.fmu import generate_fmu
 
-        if state or ports or rate or vectors or Path(problem).suffix == generating.ENDING:
-            raise PackageError("a unit is made of a mission; leave out what is for a function")
+        if state or ports or rate or vectors or commands or Path(problem).suffix == generating.ENDING:
+            raise PackageError("a unit is made of a mission; leave out what is for others")
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains)
         typer.echo(terminal(f"wrote {written}"))
         return
@@ -80,6 +83,7 @@ def generate(
         ports=_ports(ports) if ports else None,
         rate=rate,
         vectors=vectors,
+        commands=commands,
     )
     scheme_of = f", scheme {about['scheme']}" if about["scheme"] else ""
     typer.echo(terminal(f"{about['title']}{scheme_of}, {about['real']}: wrote {folder}"))

@@ -1,4 +1,4 @@
-"""Generate C from whatever can become C: the controller of a mission, or a function."""
+"""Generate C from whatever can become C: the controller of a mission, a function, an allocator."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.delivery import packaging
+from casadi_gnc.delivery.allocators import generate_allocator
 from casadi_gnc.delivery.functions import generate_function
 from casadi_gnc.errors import PackageError
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.problem_files.document import read
 
 #: Ending of files that CasADi's `Function.save` writes.
 ENDING = ".casadi"
@@ -33,12 +35,14 @@ def generate(
     ports: Mapping[str, Any] | None = None,
     rate: float | None = None,
     vectors: str | Path | np.ndarray | None = None,
+    commands: str | Path | None = None,
 ) -> dict[str, Any]:
     """Write a flight package; return what was made of what.
 
     Parameters
     ----------
-    thing : a mission, a mission file or the name of a shipped one; a CasADi function, or a .casadi file.
+    thing : a mission, a mission file or the name of a shipped one; a CasADi function, or a .casadi file; an allocation
+        file or the name of a shipped one.
     out : folder of the package.
     name : prefix of every symbol; the mission's or the function's name by default.
     real : "float64" or "float32".
@@ -47,6 +51,7 @@ def generate(
     force : overwrite a package that was edited.
     scheme, tunable : of a mission, as for `casadi_gnc.delivery.packaging.generate`.
     state, ports, rate, vectors : of a function, as for `casadi_gnc.delivery.functions.generate_function`.
+    commands : of an allocation file, as for `casadi_gnc.delivery.allocators.generate_allocator`.
 
     Raises
     ------
@@ -60,11 +65,15 @@ def generate(
     >>> about = generate(law, "fw/law", state={"i": "i_next"}, rate=100)  # doctest: +SKIP
     """
     common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force}
+    of_missions = {"scheme": scheme, "tunable": tunable}
+    of_functions: dict[str, Any] = {"state": state, "ports": ports, "rate": rate, "vectors": vectors}
     if isinstance(thing, ca.Function) or (not isinstance(thing, Mission) and Path(thing).suffix == ENDING):
-        _refuse({"scheme": scheme, "tunable": tunable}, "a function")
-        own = {"state": state, "ports": ports, "rate": rate, "vectors": vectors, "steps": steps}
-        return generate_function(thing, out, **common, **own)
-    _refuse({"state": state, "ports": ports, "rate": rate, "vectors": vectors}, "a mission")
+        _refuse({**of_missions, "commands": commands}, "a function")
+        return generate_function(thing, out, **common, **of_functions, steps=steps)
+    if isinstance(thing, (str, Path)) and read(thing).data.get("kind") == "allocation":
+        _refuse({**of_missions, **of_functions, "steps": steps}, "an allocation file")
+        return generate_allocator(thing, out, **common, commands=commands)
+    _refuse({**of_functions, "commands": commands}, "a mission")
     steps = packaging.STEPS if steps is None else steps
     return packaging.generate(thing, out, **common, scheme=scheme, tunable=tunable, steps=steps)
 

@@ -14,17 +14,19 @@ from typing import Any
 from casadi_gnc import guests
 from casadi_gnc.embedded import flight_function, package, saving
 from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.flight_allocator import FlightAllocator
 from casadi_gnc.embedded.packable import Packable, PackableController, PackableFunction
 from casadi_gnc.errors import GncError, PackageError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.onboard import describe, sampled
 from casadi_gnc.missions.origin import Origin
+from casadi_gnc.problem_files.allocation_file import AllocationCase, load_allocation
 from casadi_gnc.problem_files.document import of_text
 from casadi_gnc.problem_files.loading import load, load_document
 
 PROBLEM, CONTROLLER, FUNCTION = "problem.toml", "controller.json", "function.json"
 #: The file that a package keeps, by what it was made of.
-KEPT = {"": PROBLEM, "objects": CONTROLLER, "function": FUNCTION}
+KEPT = {"": PROBLEM, "objects": CONTROLLER, "function": FUNCTION, "allocation": PROBLEM}
 
 
 def kept(
@@ -65,6 +67,17 @@ def load_again(origin: Origin) -> Mission:
     return load_document(of_text(path, origin.text), origin.changes, strict=False)
 
 
+def flight_allocator(case: AllocationCase) -> FlightAllocator:
+    """Return what is packed of an allocation file; raise `PackageError` for what does not fly."""
+    for given, what in (
+        (case.keep_direction, "keep_direction is solved by linear programs"),
+        (case.least_force is not None, "least_force_N is solved by a search"),
+    ):
+        if given:
+            raise PackageError(f"{case.name}: {what}, which has no bounded time on board; leave the option out")
+    return FlightAllocator(case.title, case.problem, case.row_scale, case.units)
+
+
 def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tuple[Mission | None, Packable]:
     """Return the mission, where a file is kept, and what a package was made of.
 
@@ -76,6 +89,9 @@ def rebuilt(folder: Path, about: dict[str, Any], tunable: Sequence[str]) -> tupl
     problem = about.get("problem", {})
     if problem.get("made_of") == "function":
         return None, PackableFunction(flight_function.from_text(_kept(folder, FUNCTION, problem["sha256"])))
+    if problem.get("made_of") == "allocation":
+        _kept(folder, PROBLEM, problem["sha256"])
+        return None, flight_allocator(load_allocation(folder / PROBLEM))
     if problem.get("made_of") == "objects":
         return None, PackableController(saving.from_text(_read(folder / CONTROLLER)))
     for path, sha256 in problem.get("code", {}).items():

@@ -86,6 +86,7 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
         "title": made.title,
         "scheme": made.scheme,
         "is_exact": made.is_exact,
+        "machine": made.machine,
         "is_flown": mission is not None,
         "is_named": (mission is None or mission.digest == about["problem"]["sha256"]),
         "warnings": warnings(mission, made.scheme, about["real"]),

@@ -49,6 +49,7 @@ class _Rebuilt(_Answer):
     title: str
     scheme: str
     is_exact: bool
+    machine: str
     is_flown: bool
     is_named: bool
     warnings: list[str]
@@ -210,7 +211,7 @@ class _Bench:
             wrong = int((self._words("flown_in", self._shape[1]) != inputs).sum())
             lines[-1]["words"], lines[-1]["of"] = lines[-1]["words"] + wrong, lines[-1]["of"] + inputs.size
         if self._about.real == "float64":
-            what = "host with the C library's functions against CasADi's machine"
+            what = f"host with the C library's functions against {self.anew.machine}"
             what += "" if self.anew.is_exact else ", whose linear solvers compute in another order"
             differences = compare.differences(self._words("other"), self._words("expected"), self.layout)
             lines.append(_comparison(what, differences, exact=self.anew.is_exact))

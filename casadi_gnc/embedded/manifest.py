@@ -49,7 +49,7 @@ class MadeOf(_Model):
     """What a package was made of: a problem file, what was changed and the user's own code; objects; a function."""
 
     sha256: _Hash
-    made_of: Literal["", "objects", "function"] = ""
+    made_of: Literal["", "objects", "function", "allocation"] = ""
     file: str = ""
     changes: dict[str, Any] = {}
     code: dict[_Path, _Hash] = {}

@@ -59,6 +59,11 @@ class Packable(Protocol):
         """Whether that machine computes in the order of the C."""
         ...
 
+    @property
+    def machine(self) -> str:
+        """What that machine is called."""
+        ...
+
 
 @dataclass(frozen=True, eq=False)
 class PackableController:
@@ -66,6 +71,7 @@ class PackableController:
 
     own: Controller
     is_exact = True
+    machine = "CasADi's machine"
 
     @property
     def title(self) -> str:
@@ -110,6 +116,7 @@ class PackableFunction:
 
     own: FlightFunction
     scheme = ""
+    machine = "CasADi's machine"
 
     @property
     def title(self) -> str:

@@ -106,16 +106,19 @@ def render_source(controller: Controller, options: Options) -> str:
         defaults=_defaults(controller, options),
         first=_copy(access(controller.measured, "state->good."), access(controller.measured, "input->")),
         copies=_copies(controller),
-        allocation=_problem(controller.allocation, options) if controller.allocation is not None else None,
+        allocation=problem_tables(controller.allocation, options) if controller.allocation is not None else None,
     )  # fmt: skip
 
 
 def allocator_files(controller: Controller, options: Options) -> dict[str, str]:
+    """Return the units of the allocator where a controller has one."""
+    return {} if controller.allocation is None else allocator_units(controller.allocation, options)
+
+
+def allocator_units(problem: AllocationProblem, options: Options) -> dict[str, str]:
     """Return the units of the allocator under the package's own names, so that two of them link into one image."""
-    if controller.allocation is None:
-        return {}
     sizes = template("package_sizes.j2").render(
-        **_common(controller, options), allocation=_sizes(controller)
+        name=options.name, real=options.real, allocation=allocation_sizes(problem)
     )  # fmt: skip
     runtime, files = assets.folder("codegen") / "runtime", {}
     for unit in online.units():
@@ -135,9 +138,12 @@ def _common(controller: Controller, options: Options) -> dict[str, Any]:
 
 
 def _sizes(controller: Controller) -> dict[str, int] | None:
-    if controller.allocation is None:
-        return None
-    return dict(zip(("N", "R", "P", "V"), online.sizes(controller.allocation), strict=True))
+    return None if controller.allocation is None else allocation_sizes(controller.allocation)
+
+
+def allocation_sizes(problem: AllocationProblem) -> dict[str, int]:
+    """Return the sizes that the allocator is compiled for."""
+    return dict(zip(("N", "R", "P", "V"), online.sizes(problem), strict=True))
 
 
 def _derived(controller: Controller) -> int:
@@ -238,7 +244,7 @@ def _defaults(controller: Controller, options: Options) -> list[str]:
     ]
 
 
-def _problem(problem: AllocationProblem, options: Options) -> dict[str, Any]:
+def problem_tables(problem: AllocationProblem, options: Options) -> dict[str, Any]:
     """Return the constant tables of the allocation problem, row by row."""
     arrays = {"A0": problem.effectiveness}
     if online.sizes(problem)[2]:
