@@ -129,10 +129,13 @@ def program_of(varied: Varied, maths: Math = "gnc") -> Program:
 
 def _operations(tapes: Tapes, timing: Timing) -> int:
     """Return how many operations of the tapes a sample takes."""
-    often = {"start": 0, "configure": 0, "plant": timing.substeps}
-    if timing.mode == "continuous":
-        often |= dict.fromkeys(("stage", "sense", "before", "allocate", "flow"), 4)
-        often["point"] = 3
+    sampled, fused = timing.mode == "sampled", "stage" in tapes.functions
+    steps = timing.substeps if sampled else 1
+    often = {"start": 0, "configure": 0, "plant": 0, "rate": 4 * steps, "point": 3 * steps, "weigh": 3 * steps}
+    often["join"] = steps
+    if not sampled:
+        of_a_stage = 0 if fused else 4
+        often |= {"stage": 4, "flow": 4, **dict.fromkeys(("sense", "before", "allocate"), of_a_stage)}
     return sum(often.get(name, 1) * tape.n_instructions() for name, tape in tapes.functions.items())
 
 

@@ -16,9 +16,21 @@ def runge_kutta(rate: Callable[[Any, Any], Any], t: Any, x: Any, h: Any) -> Any:
     k2 = rate(t + h / 2, x + h / 2 * k1)
     k3 = rate(t + h / 2, x + h / 2 * k2)
     k4 = rate(t + h, x + h * k3)
-    return join(x, h, k1, k2, k3, k4)
+    total = k1
+    for weight, slope in zip(WEIGHTS[1:], (k2, k3, k4), strict=True):
+        total = weigh(total, weight, slope)
+    return join(x, h, total)
 
 
-def join(x: Any, h: Any, k1: Any, k2: Any, k3: Any, k4: Any) -> Any:
-    """Return x after one step, from the slopes of its four stages."""
-    return x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+#: Of the slopes of the four stages in their sum.
+WEIGHTS = (1, 2, 2, 1)
+
+
+def weigh(total: Any, weight: Any, slope: Any) -> Any:
+    """Return a sum of slopes with one more."""
+    return total + weight * slope
+
+
+def join(x: Any, h: Any, total: Any) -> Any:
+    """Return x after one step, from the weighed sum of the slopes of its four stages."""
+    return x + h / 6 * total

@@ -70,7 +70,7 @@ class Engine(Protocol):
 
 
 #: Ports that flights side by side have in common.
-SHARED = ("t", "middle", "length")
+SHARED = ("t", "middle", "length", "weight")
 
 
 class _Flight(ctypes.Structure):
@@ -100,6 +100,7 @@ def flight_source(
     """Return the C of whole flights: every tape and the loop over them; side by side, LANES at once (-DLANES=4)."""
     plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
     configure = tapes.functions.get("configure")
+    unused = ("before", "allocate") if fused else ("plant",)
 
     def called(name: str, sample: str = "s->", **places: str) -> str:
         """Return the call of a tape; `sample` owns what one evaluation of the controller leaves behind."""
@@ -136,7 +137,7 @@ def flight_source(
         tapes=[
             print_function(tape, maths=maths, shared=SHARED if side_by_side else None)
             for name, tape in tapes.functions.items()
-            if not (fused and name in ("before", "allocate"))
+            if name not in unused
         ],
     )
 
@@ -149,7 +150,7 @@ def _places(sample: str) -> dict[str, str]:
         "memory": f"{sample}m",
         "told": f"{sample}actuators",
         "t": "t",
-        "middle": "middle",
+        "middle": "&middle",
         "x": "x",
         "m": "m",
         "noise": "noise",

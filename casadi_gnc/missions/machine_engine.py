@@ -8,6 +8,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.allocation import Allocate
+from casadi_gnc.mathematics.integrators import WEIGHTS
 from casadi_gnc.mathematics.noise import uniform_count, uniforms
 from casadi_gnc.missions.engines import Carried
 from casadi_gnc.missions.mission import Mission
@@ -123,11 +124,12 @@ class VirtualMachineEngine:
                 carried.x[:] = tape["plant"].one(**{**s, "t": t + i * step, "x": carried.x})
             return
         state = np.concatenate([carried.x, s["memory"]])
-        slopes = [self._slope(s)]
-        for length in (h / 2, h / 2, h):
-            moved = tape["point"].one(state=state, slope=slopes[-1], length=length)
+        slope = total = self._slope(s)
+        for length, weight in zip((h / 2, h / 2, h), WEIGHTS[1:], strict=True):
+            moved = tape["point"].one(state=state, slope=slope, length=length)
             at = {"t": t + length, "x": moved[:n], "m": moved[n:], "derived": carried.derived}
             at |= {name: s[name] for name in ("middle", "noise")}
-            slopes.append(self._slope(self._control(carried, at)))
-        joined = tape["join"].one(state=state, **{f"k{i}": slope for i, slope in enumerate(slopes, 1)})
+            slope = self._slope(self._control(carried, at))
+            total = tape["weigh"].one(total=total, slope=slope, weight=weight)
+        joined = tape["join"].one(state=state, total=total)
         carried.x[:], carried.m[:] = joined[:n], joined[n:]

@@ -9,20 +9,23 @@ sense     t, [middle], x, noise -> y
 before    t, [middle], y, good, m, actuators -> accepted, memory, wanted, limited, lower, upper, flags
 allocate  accepted, limited, actuators, lower, upper -> told     (where the allocation is symbolic)
 after     t, accepted, memory, wanted, limited, told -> m        (sampled mode)
-plant     t, x, told, noise -> x, one Runge-Kutta step           (sampled mode)
+rate      t, middle, x, told, noise -> slope of x, way: the slope times half a step      (sampled mode)
+plant     t, x, told, noise -> x, one Runge-Kutta step: four times `rate` and what joins them, with the same words
+          in one piece, four times as long                       (sampled mode)
 flow      t, middle, x, accepted, memory, wanted, limited, told, noise -> slope of x and m (continuous, other
           allocation)
 stage     t, middle, x, noise, good, m, actuators -> slope, accepted, memory, wanted, limited, flags, told: sense
           to flow in one that shares what they have in common   (continuous mode, symbolic allocation)
-point     state, slope, length -> moved, an integrator stage     (continuous mode)
-join      state, k1, k2, k3, k4 -> state, the stages' sum         (continuous mode)
+point     state, slope, length -> moved, where the next stage of the integrator is
+weigh     total, slope, weight -> total, the sum of the stages' slopes
+join      state, total -> state, one Runge-Kutta step later
 settle    x -> x in the representation kept between steps
 observe   everything of a sample -> one row of the record
 tally     row, tally -> tally, the running metrics
 configure p -> derived, x: what follows from the parameters alone, and the start (where there are parameters)
 ========  =====================================================================================
 
-`middle` (continuous mode) is the time in the middle of the integrator's step, where all its stages take their
+`middle` is the time in the middle of the integrator's step, where all its stages take their
 decisions on time (`casadi_gnc.mathematics.jumps`); the tape `plant` knows its own.
 
 Ports have the names of columns, so whoever runs a tape, in C or by CasADi's machine, finds its arguments by
@@ -40,7 +43,7 @@ import numpy as np
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics import noise
-from casadi_gnc.mathematics.integrators import join
+from casadi_gnc.mathematics.integrators import join, weigh
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.missions import metrics
 from casadi_gnc.missions.loop import Loop
@@ -121,7 +124,12 @@ def tapes_of(mission: Mission, scheme: Scheme, parameters: Parameters | None = N
         later = loop.remembered(s.t, s.y, s.m, s.wanted, s.limited, s.actuators)
         parts["after"] = ({"t": s.t, **sample}, {"m": later})
         stepped = loop.stepped(s.t, s.x, s.actuators, s.noise)
-        parts["plant"] = ({**s.ports("t", "x"), **told, "noise": s.noise}, {"stepped": stepped})
+        held = {**s.ports("t", "x"), **told, "noise": s.noise}
+        parts["plant"] = (held, {"stepped": stepped})
+        # CasADi makes one constant of those of a slope and of the step: `way` has the words that `plant` has.
+        slope, step = loop.moved(s.t, s.x, s.actuators, s.noise), timing.sample_period / timing.substeps
+        parts["rate"] = _on_one_side(held, {"slope": slope, "way": step / 2 * slope})
+        parts.update(_integrator(s.x.numel(), step))
     else:
         if symbolic:
             parts["stage"] = _stage(loop)
@@ -193,10 +201,11 @@ def _on_one_side(inputs: dict[str, Any], outputs: dict[str, Any]) -> Ports:
 
 
 def _integrator(size: int, h: float) -> dict[str, Ports]:
-    state, slope, length = ca.SX.sym("state", size), ca.SX.sym("slope", size), ca.SX.sym("length")
-    k = [ca.SX.sym(f"k{i}", size) for i in range(1, 5)]
-    joined = join(state, h, *k)
+    """Return the ports of what goes around the rates of a step of length h."""
+    state, slope, total = (ca.SX.sym(name, size) for name in ("state", "slope", "total"))
+    length, weight = ca.SX.sym("length"), ca.SX.sym("weight")
     return {
         "point": ({"state": state, "slope": slope, "length": length}, {"moved": state + length * slope}),
-        "join": ({"state": state, "k1": k[0], "k2": k[1], "k3": k[2], "k4": k[3]}, {"joined": joined}),
+        "weigh": ({"total": total, "slope": slope, "weight": weight}, {"weighed": weigh(total, weight, slope)}),
+        "join": ({"state": state, "total": total}, {"joined": join(state, h, total)}),
     }
