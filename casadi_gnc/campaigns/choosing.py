@@ -17,11 +17,11 @@ from casadi_gnc.errors import CampaignError, GpuError
 #: Engines by name.
 ENGINES = ("auto", "c", "cuda", "dask", "dask:cuda")
 #: Operations of the tapes that a core does in a second, by the kind of its vector instructions.
-_PER_CORE = {"none": 3e9, "baseline": 5e9, "avx2": 9e9, "avx512": 15e9}
+_PER_CORE = {"none": 3e9, "baseline": 5e9, "avx2": 9e9, "avx512": 18e9}
 #: The same where the on-board solver iterates, whose own operations are not in the tapes.
 _PER_CORE_ITERATING = 0.8e9
 #: Operations that a GPU of a data centre does in a second, by how many a sample has (up to, rate).
-_PER_GPU = ((3000, 12e12), (10000, 6e12), (float("inf"), 4e12))
+_PER_GPU = ((3000, 18e12), (7000, 7e12), (float("inf"), 2.5e12))
 _PER_GPU_ITERATING = 0.15e12
 #: Flights that fill it.
 _FILLS_GPU = 34_000
