@@ -74,14 +74,14 @@ def print_function(
         elif node.code == ca.OP_INPUT:
             text = node.place
         else:
-            flags = [nodes[i].is_flag and shared is None for i in node.operands]
+            flags = [nodes[i].is_flag for i in node.operands]
             try:
-                text = expression(node, flags, maths, real)
+                side_by_side = [False] * len(flags)
+                text = expression(node, flags if shared is None else side_by_side, maths, real)
             except PrinterError as error:
                 raise PrinterError(f"{function.name()}: {error}") from None
             if shared is not None and node.is_flag:
-                # Vectors hold numbers: a flag is 1 or 0, and both sides of it are evaluated.
-                text = f"({text.replace(' && ', ' & ').replace(' || ', ' | ')}) ? {one} : {zero}"
+                text = _as_number(node.code, text, flags, real)
             text = text.format(*(f"a{i}" for i in node.operands))
         body.append(f"    const {flag if node.is_flag and shared is None else 'gnc_real'} a{k} = {text};")
     as_number = f" ? {one} : {zero}"
@@ -97,6 +97,21 @@ def print_function(
     loop = ["    long l;", "#pragma omp simd", "    for (l = 0; l < LANES; l++) {"]
     inner = [f"    {line}" for line in (*body, *stores)]
     return "\n".join([head, loop[0], *unused, *loop[1:], *inner, "    }", "}", ""])
+
+
+def _as_number(code: int, text: str, flags: list[bool], real: Real) -> str:
+    """Return a flag as 1 or 0, which vectors hold; `flags` says which operands are such numbers already.
+
+    Logic is arithmetic, exact on these numbers: gcc makes choices between truths of it otherwise, for which it has no
+    vector instruction, and the whole loop stays scalar.
+    """
+    zero, one = c_constant(0.0, real), c_constant(1.0, real)
+    x, y = ([f"{{{i}}}" if flag else f"(({{{i}}} != {zero}) ? {one} : {zero})" for i, flag in enumerate(flags)] * 2)[:2]
+    if code == ca.OP_NOT:
+        return f"{one} - {x}"
+    if code == ca.OP_AND:
+        return f"{x} * {y}"
+    return f"({f'{x} + {y} > {zero}' if code == ca.OP_OR else text}) ? {one} : {zero}"
 
 
 def _is_read(function: ca.Function, port: int) -> bool:

@@ -65,11 +65,17 @@ def flown(**options):
     return casadi_gnc.campaign(given.pop("mission"), given.pop("flights"), **given)
 
 
-@pytest.mark.parametrize("name", few_quickly(FLOWN))
+def every_mission():
+    """Return the shipped missions that are not flown anyway."""
+    found = (name for name in casadi_gnc.shipped() if casadi_gnc.problem_files.read(name).data["kind"] == "mission")
+    return [pytest.param(name, marks=pytest.mark.long) for name in found if name not in FLOWN]
+
+
+@pytest.mark.parametrize("name", [*few_quickly(FLOWN), *every_mission()])
 def test_lanes_and_threads_have_the_words_of_single_flights(name):
-    scheme, keys = FLOWN[name]
+    scheme, keys = FLOWN.get(name, (None, ["initial.*"]))
     varied = vary(short(name, 60), keys, scheme)
-    cases = 11  # no multiple of the lanes
+    cases = 257  # no multiple of the lanes
     turns = np.sin(np.arange(cases * varied.parameters.size)).reshape(cases, -1)
     values, seeds = varied.parameters.nominal * (1 + 0.01 * turns), np.arange(cases, dtype=np.uint64) + 5
     runs = [CompiledBatch(varied, vectors=kind, threads=1).fly(values, seeds).words for kind in KINDS]
@@ -116,7 +122,8 @@ def test_the_loops_over_lanes_are_vector_instructions(name, tmp_path):
     scheme, keys = FLOWN[name]
     varied = vary(short(name), keys, scheme)
     batch = CompiledBatch(varied, vectors="avx2", threads=1)
-    hot = {"stage"} if "stage" in varied.tapes.functions else {"plant", "before", "allocate", "after"}
+    hot = {"stage"} if "stage" in varied.tapes.functions else {"rate", "before", "allocate", "after"}
+    hot |= {"observe", "tally"}
     assert hot <= vectorised(batch, tmp_path)
 
 
