@@ -1,8 +1,8 @@
 """A satellite by tables: a rigid body in [spacecraft], and a table for each thing that it carries.
 
 Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]]; [orbit],
-[field], [environment]; [[sensor]], [estimator]; [[reference]]; [truth], [initial]. A class derived from this one adds
-parts of its own in `components`.
+[field], [environment], [[plate]], [air]; [[sensor]], [estimator]; [[reference]]; [truth], [initial]. A class derived
+from this one adds parts of its own in `components`.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ from .on_board import TorqueByField, WheelLimits
 from .orbit_tables import Environment, FieldTable, OrbitTable
 from .part_tables import FlexibleModeTable, MagnetorquerTable, SloshTable, ThrusterTable, WheelTable
 from .plant import Satellite
+from .plate_tables import AirTable, PlateTable
 from .reference_tables import AnyReference, timeline
 from .sensor_tables import AnySensor, made
 from .surroundings import SunDirection, Surroundings
@@ -76,6 +77,8 @@ class SatelliteCraft(Craft):
     slosh: list[SloshTable] = table([], "a mass of liquid; there may be several")
     orbit: OrbitTable | None = table(None)
     field: FieldTable | None = table(None)
+    plate: list[PlateTable] = table([], "a side that air and sunlight push; there may be several")
+    air: AirTable | None = table(None)
     environment: Environment = table(Environment())
     sensor: list[AnySensor] = table([], "a sensor; there may be several")
     estimator: AnyEstimator | None = table(None)
@@ -94,6 +97,10 @@ class SatelliteCraft(Craft):
         if self.field is not None:
             self._field()
         self._turning()
+        if (self.plate or self.air is not None) and self.orbit is None:
+            raise MisfitError("air and sunlight need to know where the satellite is; give [orbit]", "plate")
+        if self.air is not None and not self.plate:
+            raise MisfitError("there is no [[plate]] for the air to push; give one for each side", "air")
         self.pointed()
         self._estimator()
         return self
@@ -163,7 +170,14 @@ class SatelliteCraft(Craft):
         if self.orbit is None:
             return Surroundings()
         field = None if self.field is None else self._field().at
-        return Surroundings(self.orbit.gravity(), self.environment.gravity_gradient, field=field, sun=self._sun())
+        return Surroundings(
+            self.orbit.gravity(),
+            self.environment.gravity_gradient,
+            field=field,
+            sun=self._sun(),
+            plates=tuple(each.plate() for each in self.plate),
+            air=None if self.air is None else self.air.atmosphere(),
+        )
 
     def _sun(self) -> SunDirection | None:
         epoch = self._when()

@@ -144,9 +144,13 @@ class Satellite(Plant):
         now, told, drawn = self.state.split(x), self.inputs.split(actuators), self.noise.split(noise)
         around = self._around(t, now)
         torque = self.disturbance.at(t) + self.surroundings.torque(now, self.assembly.inertia(now))
+        pushed = ca.SX.zeros(3)
+        if self.surroundings.plates:
+            pushed, turning = self.surroundings.pushed(now, around, self.assembly.centre(now))
+            torque = torque + turning
         turned, parts, force = self.assembly.moved(t, now.rate, now, told, torque, around)
         rates = dict(vars(self.assembly.state.split(parts)))
-        rates.update(self.surroundings.moved(now, force / self.assembly.mass))
+        rates.update(self.surroundings.moved(now, (force + pushed) / self.assembly.mass))
         for sensor in self.sensors:
             rates.update(sensor.rate(t, now, drawn))
         return self.state.pack(mrp=attitude.mrp_rate(now.mrp, now.rate), rate=turned, **rates)

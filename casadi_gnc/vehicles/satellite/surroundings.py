@@ -1,4 +1,4 @@
-"""What is outside a satellite: the orbit it is on, gravity across its body, the magnetic field, the sun."""
+"""What is outside a satellite: its orbit, gravity across its body, the magnetic field, the sun, air and sunlight."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.mechanics import attitude, earth, quaternions
+from casadi_gnc.mechanics import attitude, earth, plates, quaternions
 from casadi_gnc.mechanics.circular_orbit import EARTH_MU
 from casadi_gnc.mechanics.earth import Epoch
+from casadi_gnc.mechanics.plates import Atmosphere, Plate
 from casadi_gnc.signals import Layout, Signal
 
 
@@ -38,6 +39,8 @@ class Surroundings:
     mu : of the central body, [m^3/s^2].
     field : magnetic field (3,), [T], inertial, at a time [s] and a position; None where nothing needs it.
     sun : unit vector to the sun, (3,), inertial, at a time [s]; None where nothing needs it.
+    plates : what air and sunlight push.
+    air : its density and wind; None for none.
     """
 
     gravity: Callable[[Any], Any] | None = None
@@ -45,6 +48,8 @@ class Surroundings:
     mu: float = EARTH_MU
     field: Callable[[Any, Any], Any] | None = None
     sun: Callable[[Any], Any] | None = None
+    plates: tuple[Plate, ...] = ()
+    air: Atmosphere | None = None
 
     @property
     def state(self) -> Layout:
@@ -77,6 +82,18 @@ class Surroundings:
         distance = ca.sqrt(square)
         up = ca.mtimes(attitude.dcm(now.mrp), now.position / distance)
         return 3 * self.mu / (square * distance) * ca.cross(up, ca.mtimes(inertia, up))
+
+    def pushed(self, now: Any, around: Any, centre: Any) -> tuple[Any, Any]:
+        """Return force [N] and torque [N m] of air and sunlight, (3,) each, body axes; `around` is what is felt."""
+        force, torque = ca.SX.zeros(3), ca.SX.zeros(3)
+        if self.air is not None:
+            density, flight = self.air.at(now.position, now.velocity)
+            blown = plates.air(self.plates, centre, density, ca.mtimes(attitude.dcm(now.mrp), flight))
+            force, torque = force + blown[0], torque + blown[1]
+        if self.plates and self.sun is not None:
+            lit = plates.light(self.plates, centre, around.sun, around.sunlight)
+            force, torque = force + lit[0], torque + lit[1]
+        return force, torque
 
     def moved(self, now: Any, push: Any) -> dict[str, Any]:
         """Return r' and v' under an acceleration from thrusters, (3,), [m/s^2], body axes."""
