@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from casadi_gnc.registry import Registry
 
-_FAMILIES = ("geometry", "authority", "funnels", "gains", "sampling", "noise", "allocation", "numbers", "requirements")
+_FAMILIES = (
+    "geometry",
+    "authority",
+    "funnels",
+    "gains",
+    "sampling",
+    "noise",
+    "allocation",
+    "numbers",
+    "requirements",
+    "dispersions",
+)
 
 REGISTRY = Registry(
     "check",

@@ -97,13 +97,17 @@ class Varied:
         layout = self.mission.truth.measurement
         limits = np.concatenate([np.full(s.size, s.limit) for s in layout.signals] or [np.zeros(0)])
         bodies = inertias.reshape(len(values), -1, 3, 3)
-        for i in range(len(values)):
+        sound = np.zeros(len(values), dtype=bool)
+        finite = np.flatnonzero(np.isfinite(bodies).all(axis=(1, 2, 3)))
+        sound[finite] = (np.linalg.eigvalsh(bodies[finite]) > 0).all(axis=(1, 2))
+        credible = np.abs(seen) <= limits
+        for i in np.flatnonzero(~(sound & credible.all(axis=1))):
             if told[i]:
                 continue
-            if not np.isfinite(bodies[i]).all() or not (np.linalg.eigvalsh(bodies[i]) > 0).all():
+            if not sound[i]:
                 told[i] = "the true inertia is not positive definite"
-            elif not (np.abs(seen[i]) <= limits).all():
-                row = int(np.flatnonzero(~(np.abs(seen[i]) <= limits))[0])
+            else:
+                row = int(np.flatnonzero(~credible[i])[0])
                 name = next(s.name for s in layout.signals if layout.place(s.name).stop > row)
                 told[i] = f"{name} starts at {seen[i][row]:g}, beyond the largest credible, {limits[row]:g}"
         return told

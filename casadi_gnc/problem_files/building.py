@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from casadi_gnc.errors import GncError, LawError, ProblemError, RequirementError
+from casadi_gnc.campaigns.dispersions import DispersionTable
+from casadi_gnc.errors import FlightError, GncError, LawError, ProblemError, RequirementError
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import fitting
 from casadi_gnc.missions.actuation import Actuation
@@ -16,6 +17,7 @@ from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.parts import Parts
+from casadi_gnc.missions.paths import number_at, numbers_of
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.timing import Noise, Timing
 from casadi_gnc.problem_files.document import Complaints
@@ -96,7 +98,27 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
         except RequirementError as error:
             complaints.add(("requirement", i, *filter(None, [error.key])), str(error))
     complaints.settle()
+    _look_at_dispersions(made, common.dispersion, complaints)
+    complaints.settle()
     return made.held_to([table.requirement() for table in common.requirement])
+
+
+def _look_at_dispersions(made: Mission, tables: list[DispersionTable], complaints: Complaints) -> None:
+    """Note dispersions whose key leads nowhere or is taken, and distributions that do not fit their keys."""
+    taken: dict[str, str] = {}
+    for i, table in enumerate(tables):
+        try:
+            keys = numbers_of(made, table.key)
+        except FlightError as error:
+            complaints.add(("dispersion", i, "key"), str(error))
+            continue
+        twice = next((key for key in keys if key in taken), None)
+        if twice:
+            why = f"gives {twice}, as {taken[twice]!r} does; each number can follow one distribution only"
+            complaints.add(("dispersion", i, "key"), why)
+        taken |= dict.fromkeys(keys, table.key)
+        with complaints.about("dispersion", i):
+            table.distribution(len(keys), complaints.folder, [number_at(made, key) for key in keys])
 
 
 @contextmanager

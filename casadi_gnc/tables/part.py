@@ -89,6 +89,8 @@ def own_tables(model: type[BaseModel]) -> list[str]:
 
 def plain(value: Any) -> Any:
     """Return a value as TOML would give it: arrays, tuples and CasADi numbers as lists."""
+    if type(value) in (float, int, str, bool) or isinstance(value, Part):
+        return value
     if isinstance(value, (list, tuple)):
         return [plain(each) for each in value]
     if isinstance(value, dict):
