@@ -90,6 +90,14 @@ WRONG = {
         "[[magnetorquer]]\naxis = [1.0, 0.0, 0.0]\nmax_dipole_A_m2 = 5.0",
         "magnetorquers push against a magnetic field; give [field]",
     ),
+    "unloading": (
+        "[momentum]\nunload_per_s = 1e-3",
+        "momentum.unload_per_s: coils take momentum away; give [[magnetorquer]]",
+    ),
+    "speeds": (
+        "[momentum]\nnull_per_s = 1e-3\nrest_speeds_rad_per_s = [1.0]",
+        "momentum.rest_speeds_rad_per_s: 1 speeds, and there are 3 wheels",
+    ),
     "thruster": (
         "[[thruster]]\nposition_m = [1.0, 0.0, 0.0]\ndirection = [0.0, 1.0, 0.0]\nmax_force_N = 1.0\nmin_force_N = 2.0",
         "thruster[1].min_force_N: 2 exceeds max_force_N 1",

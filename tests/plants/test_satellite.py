@@ -14,6 +14,7 @@ from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.multibody import Assembly
 from casadi_gnc.mechanics.satellite_parts import FlexibleModes, SloshMasses, Thrusters, Wheels
 from casadi_gnc.vehicles.satellite import SatelliteCraft
+from casadi_gnc.vehicles.satellite.momentum import MomentumSharing
 
 INERTIA = [[24.0, 1.0, 0.5], [1.0, 30.0, -1.0], [0.5, -1.0, 34.0]]
 
@@ -208,3 +209,29 @@ def test_three_angles_turn_frames_by_yaw_then_pitch_then_roll():
     yaw = np.array([[cy, sy, 0], [-sy, cy, 0], [0, 0, 1]])
     mrp = satellite(initial={"euler_321_deg": [30.0, -40.0, 50.0]}).start()["mrp"]
     assert np.allclose(np.array(attitude.dcm(ca.DM(mrp))), roll @ pitch @ yaw, atol=1e-14)
+
+
+def test_momentum_is_taken_away_across_the_field_and_nothing_turns(rng):
+    """Whatever is wanted comes out; what coils add takes k of the momentum across B; the rest spins to its speeds."""
+    axes, spin, k = units(rng, 4), ca.DM([0.02, 0.03, 0.02, 0.01]), 1e-3
+    speeds, rest = ca.DM(rng.uniform(-200, 200, 4)), ca.DM(rng.uniform(-100, 100, 4))
+    field, torque = rng.normal(size=3) * 3e-5, rng.normal(size=3) * 0.02
+    seen = SimpleNamespace(wheel_speed=speeds, magnetic_field=ca.DM(field))
+    for coils in (ca.DM.eye(3), units(rng, 5)):
+        count = coils.shape[1]
+        sharing = MomentumSharing(axes, spin, coils, ca.DM.ones(count) * 1e6, k, 0.01, rest, 2, 1)
+        told = np.array(ca.DM(sharing(seen, ca.DM(torque)))).ravel()
+        wheels, dipole = told[:4], np.array(coils) @ told[6 : 6 + count]
+        stored = np.array(axes) @ np.array(spin * speeds).ravel()
+        outside = np.cross(dipole, field)
+        across = stored - field * (field @ stored) / (field @ field)
+        assert np.allclose(outside, -k * across, rtol=1e-10)
+        assert np.allclose(-np.array(axes) @ wheels + outside, torque, rtol=1e-12, atol=1e-14)
+        assert not told[4:6].any()
+        assert told[-1] == 0
+        idle = np.linalg.svd(np.array(axes))[2][-1]
+        assert np.isclose(idle @ wheels, -0.01 * idle @ np.array(spin * (speeds - rest)).ravel(), rtol=1e-9)
+    one = MomentumSharing(axes, spin, ca.DM([0, 0, 1]), ca.DM([2.0]), 1.0, 0.0, rest)
+    told = np.array(ca.DM(one(seen, ca.DM(torque)))).ravel()
+    assert abs(told[4]) == 2.0  # within its limit, and the wheels know
+    assert np.allclose(-np.array(axes) @ told[:4] + np.cross([0, 0, told[4]], field), torque, rtol=1e-12, atol=1e-14)

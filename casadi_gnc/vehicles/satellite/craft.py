@@ -7,7 +7,6 @@ from this one adds parts of its own in `components`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -19,15 +18,15 @@ from pydantic import Field, model_validator
 
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import FlightError, LawError
-from casadi_gnc.mathematics.exact import array, is_number
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.mechanics.multibody import Assembly, Component
 from casadi_gnc.mechanics.reaction_wheels import TorqueGyrostat, WheelArray
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.mechanics.sensors import Sensor
-from casadi_gnc.missions.actuation import Actuators
-from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.actuation import Actuation, Actuators
+from casadi_gnc.missions.craft import Craft, EffortKeys
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.scheme import Scheme
@@ -36,20 +35,16 @@ from casadi_gnc.signals import Layout
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, table
 
-from . import part_tables
+from . import actuating, part_tables
 from .attitude_tables import InitialAttitude
 from .estimator_tables import AnyEstimator
-from .on_board import TorqueByField, WheelLimits
 from .orbit_tables import Environment, FieldTable, OrbitTable
-from .part_tables import FlexibleModeTable, MagnetorquerTable, SloshTable, ThrusterTable, WheelTable
+from .part_tables import FlexibleModeTable, MagnetorquerTable, MomentumTable, SloshTable, ThrusterTable, WheelTable
 from .plant import Satellite
 from .plate_tables import AirTable, PlateTable
 from .reference_tables import AnyReference, timeline
 from .sensor_tables import AnySensor, made
 from .surroundings import SunDirection, Surroundings
-
-#: Smallest over largest singular value of the effectiveness below which an axis is left out.
-_FLAT = 1e-9
 
 
 class Truth(Part):
@@ -75,6 +70,7 @@ class SatelliteCraft(Craft):
     magnetorquer: list[MagnetorquerTable] = table([], "a coil; there may be several")
     flexible_mode: list[FlexibleModeTable] = table([], "a bending mode; there may be several")
     slosh: list[SloshTable] = table([], "a mass of liquid; there may be several")
+    momentum: MomentumTable = table(MomentumTable())
     orbit: OrbitTable | None = table(None)
     field: FieldTable | None = table(None)
     plate: list[PlateTable] = table([], "a side that air and sunlight push; there may be several")
@@ -103,6 +99,7 @@ class SatelliteCraft(Craft):
             raise MisfitError("there is no [[plate]] for the air to push; give one for each side", "air")
         self.pointed()
         self._estimator()
+        actuating.sharing(self)
         return self
 
     def _when(self) -> Epoch | None:
@@ -253,32 +250,15 @@ class SatelliteCraft(Craft):
 
     def actuators(self) -> Actuators:
         """Return wheels, thrusters and coils as known."""
-        _, centre = self._at_rest()
-        rows = []
-        if self.wheel:
-            rows.append(-part_tables.directions(self.wheel, "axis"))
-        if self.thruster:
-            rows.append(part_tables.thrusters(self.thruster).arms(centre))
-        fixed = ca.horzcat(ca.DM(3, 0), *rows)
-        most = [each.max_torque_N_m for each in self.wheel]
-        dipoles = [each.max_dipole_A_m2 for each in self.magnetorquer]
-        lower = [-each for each in most] + [each.min_force_N for each in self.thruster] + [-each for each in dipoles]
-        upper = most + [each.max_force_N for each in self.thruster] + dipoles
-        effectiveness: Any = fixed
-        if self.magnetorquer:
-            effectiveness = TorqueByField(fixed, part_tables.directions(self.magnetorquer, "axis"))
-        speeds = tuple(each.max_speed for each in self.wheel)
-        limits = None
-        if any(not is_number(speed) or speed != math.inf for speed in speeds):
-            spin = tuple(each.spin_inertia for each in self.wheel)
-            limits = WheelLimits(speeds, spin, tuple(lower), tuple(upper))
-        return Actuators(
-            effectiveness=effectiveness,
-            lower=lower,
-            upper=upper,
-            reach=None if limits is None else limits.reach,
-            judge=None if limits is None else limits.judge,
-        )
+        return actuating.actuators(self, self._at_rest()[1])
+
+    def actuation(self, keys: Part | None = None) -> Actuation:
+        """Return the actuation of a scheme; [momentum] takes the place of its allocation."""
+        return actuating.actuation(self, self.actuators(), keys if isinstance(keys, EffortKeys) else EffortKeys())
+
+    def flaws(self) -> Iterator[MisfitError]:
+        """Yield whether wheels and thrusters leave an axis out."""
+        return actuating.flaws(self, self.actuators())
 
     def regulated(self, mission: Mission) -> dict[str, list[float]]:
         """Return the attitude of a reference that stays, and rest; of one that moves, nothing."""
@@ -306,19 +286,6 @@ class SatelliteCraft(Craft):
         from .checks import checks
 
         return checks(self, mission, scheme)
-
-    def flaws(self) -> Iterator[MisfitError]:
-        """Yield whether wheels and thrusters leave an axis out."""
-        if self.magnetorquer:
-            return
-        made = np.array(ca.DM(self.actuators().matrix(None)))
-        strength = np.linalg.svd(made, compute_uv=False)
-        if len(strength) < 3 or strength[2] < _FLAT * strength[0]:
-            what = " and ".join(name for name, there in (("wheels", self.wheel), ("thrusters", self.thruster)) if there)
-            key = "wheel" if self.wheel else "thruster"
-            flat = np.linalg.svd(made)[0][:, -1]
-            axis = ", ".join(f"{value + 0.0:.3g}" for value in flat)
-            yield MisfitError(f"the {what} make no torque about the axis ({axis}); add or turn one", key)
 
     def key_of(self, signal: str) -> tuple[str, ...]:
         """Return the key of the file that gives a state at the start."""

@@ -173,3 +173,13 @@ def slosh(tables: Sequence[SloshTable]) -> parts.SloshMasses:
         array([2 * table.damping * table.mass_kg * turn for table, turn in zip(tables, turns, strict=True)]),
         _of(tables, "offset_m"),
     )
+
+
+class MomentumTable(Part):
+    """How wheels are kept in their range while they work."""
+
+    unload_per_s: NonNegative = Field(default=0.0, description="rate at which coils take the wheels' momentum away")
+    null_per_s: NonNegative = Field(
+        default=0.0, description="rate at which wheels come to rest_speeds, turning nothing"
+    )
+    rest_speeds_rad_per_s: list[float] | None = Field(default=None, description="of each wheel; zero if left out")
