@@ -99,3 +99,61 @@ def fly(
     if liquids:
         found["slosh"] = np.array([each.getState()[0][0] for each in logged])  # at the end
     return found
+
+
+def torques_of_mrp_feedback(
+    guidance: dict[str, Any],
+    gains: dict[str, float],
+    inertia: Any,
+    axes: Any,
+    spin: Any,
+    speeds: Any,
+    steps: int,
+    h: float,
+) -> tuple[Any, Any]:
+    """Return what `mrpFeedback` commands at the last of some steps, (3,), and what `rwMotorTorque` makes of it, (N,).
+
+    Parameters
+    ----------
+    guidance : sigma_BR, omega_BR_B, omega_RN_B, domega_RN_B; the same at every step.
+    gains : K, P, Ki, integralLimit, controlLawType.
+    inertia, axes, spin, speeds : what the law believes of body and wheels: (3, 3); (3, N); (N,); (N,).
+    """
+    from Basilisk.architecture import messaging
+    from Basilisk.fswAlgorithms import mrpFeedback, rwMotorTorque
+    from Basilisk.utilities import SimulationBaseClass, macros
+
+    simulation, law, sharing = (
+        SimulationBaseClass.SimBaseClass(),
+        mrpFeedback.mrpFeedback(),
+        rwMotorTorque.rwMotorTorque(),
+    )
+    simulation.CreateNewProcess("process").addTask(simulation.CreateNewTask("task", macros.sec2nano(h)))
+    for name, value in gains.items():
+        setattr(law, name, value)
+    messages = [
+        messaging.AttGuidMsg().write(messaging.AttGuidMsgPayload(**guidance)),
+        messaging.VehicleConfigMsg().write(messaging.VehicleConfigMsgPayload(ISCPntB_B=np.ravel(inertia).tolist())),
+        messaging.RWSpeedMsg().write(messaging.RWSpeedMsgPayload(wheelSpeeds=list(speeds))),
+        messaging.RWArrayConfigMsg().write(
+            messaging.RWArrayConfigMsgPayload(
+                GsMatrix_B=np.ravel(np.array(axes).T).tolist(), JsList=list(spin), numRW=len(spin)
+            )
+        ),
+    ]
+    law.guidInMsg.subscribeTo(messages[0])
+    law.vehConfigInMsg.subscribeTo(messages[1])
+    law.rwSpeedsInMsg.subscribeTo(messages[2])
+    law.rwParamsInMsg.subscribeTo(messages[3])
+    sharing.controlAxes_B = np.eye(3).ravel().tolist()
+    sharing.rwParamsInMsg.subscribeTo(messages[3])
+    sharing.vehControlInMsg.subscribeTo(law.cmdTorqueOutMsg)
+    simulation.AddModelToTask("task", law, 2)
+    simulation.AddModelToTask("task", sharing, 1)
+    asked, shared = law.cmdTorqueOutMsg.recorder(), sharing.rwMotorTorqueOutMsg.recorder()
+    simulation.AddModelToTask("task", asked)
+    simulation.AddModelToTask("task", shared)
+    simulation.InitializeSimulation()
+    simulation.ConfigureStopTime(macros.sec2nano((steps - 1) * h))
+    simulation.ExecuteSimulation()
+    return np.array(asked.torqueRequestBody)[-1], np.array(shared.motorTorque)[-1, : len(spin)]
