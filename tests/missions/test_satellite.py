@@ -247,3 +247,18 @@ def test_a_part_of_ones_own_is_as_good(tmp_path):
     assert flight["boom_rate"][-1] == pytest.approx(0.01 * 10 / 0.5, rel=0.02)
     assert np.abs(flight["momentum"]).max() < 1e-12  # from rest, nothing outside
     assert np.abs(flight["rate"][:, 2]).max() > 1e-5
+
+
+@pytest.mark.slow
+def test_a_day_of_looking_at_the_earth():
+    """Filter, feedback and unloading at 10 Hz: pointing held, wheels off zero and far from their limits all day."""
+    flight = casadi_gnc.fly("satellites/earth_pointing_day")
+    assert all(verdict.robustness > 0 for verdict in flight.verdicts.values())
+    late = flight["time"] > 3000
+    speeds = np.abs(flight["wheel_speed"][late])
+    assert (speeds > 20).all()  # of 60 that they are to have
+    assert (speeds < 100).all()
+    assert np.abs(flight["dipole"]).max() <= 10.0
+    still = casadi_gnc.load("satellites/earth_pointing_day", {"momentum.unload_per_s": 0.0})
+    loaded = casadi_gnc.fly(still)
+    assert np.abs(loaded["wheel_speed"][-1]).max() > 1.5 * speeds.max()

@@ -39,6 +39,17 @@ HARDWARE = [
 ]
 
 
+@needs_target("cortex-m7")
+def test_filter_law_and_unloading_of_a_satellite_are_small():
+    """Gyro, star tracker, Kalman filter, feedback, coils, wheels: no word differs, at most 6000 instructions a step."""
+    name = "earth_pointing_day"
+    folder = made(f"satellites/{name}", "mrp", "float64")
+    _, expected = read_vectors(folder, "float64")
+    found = targets.measure(folder, name, boards.find("cortex-m7"), float_only=False)
+    assert int((found.outputs != expected).sum()) == 0
+    assert found.instructions.max() <= 6000
+
+
 @pytest.mark.parametrize(("real", "name"), HARDWARE)
 @pytest.mark.parametrize("mission", MISSIONS, ids=lambda mission: mission[0])
 def test_no_word_differs(mission, real, name):
