@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import importlib.util
+import re
 import sys
 from collections.abc import Mapping
 from functools import cache
@@ -18,6 +19,8 @@ from casadi_gnc.errors import GpuError
 from casadi_gnc.system import folders, library_cache, temporary
 
 ENDING = ".cubin"
+#: Names of NVRTC and of what it loads by itself.
+_OF_LINUX = ("libnvrtc.so.*", "libnvrtc-builtins.so.*")
 
 
 @cache
@@ -29,12 +32,12 @@ def library() -> ctypes.CDLL:
     GpuError
         Where it is not installed, or cannot be loaded.
     """
-    name = "nvrtc64_*.dll" if sys.platform == "win32" else "libnvrtc.so.*"
+    name, builtins = ("nvrtc64_*.dll", "nvrtc-builtins64_*.dll") if sys.platform == "win32" else _OF_LINUX
     places = _wheels(name)
     if not places:
         raise GpuError('NVRTC is not installed; pip install "casadi-gnc[cuda]"')
     try:
-        for more in _wheels(name.replace("nvrtc", "nvrtc-builtins", 1)):
+        for more in places[0].parent.glob(builtins):
             ctypes.CDLL(str(more))  # NVRTC looks for it on the loader's path alone
         return ctypes.CDLL(str(places[0]))
     except OSError as error:
@@ -48,7 +51,8 @@ def _wheels(name: str) -> list[Path]:
     except (ImportError, ValueError):
         return []
     homes = [Path(home) for home in (spec.submodule_search_locations or [])] if spec else []
-    return sorted((path for home in homes for path in home.glob(f"*/*/{name}")), reverse=True)
+    found = [path for home in homes for path in home.glob(f"*/*/{name}")]
+    return sorted(found, key=lambda path: [int(number) for number in re.findall(r"\d+", path.name)], reverse=True)
 
 
 def version() -> tuple[int, int]:
