@@ -52,6 +52,7 @@ def campaign(
         str | None, typer.Option(help="Whole records to keep, such as worst:20,failed:50,random:10.")
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Draw what the flights say into this folder.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
     picture_format: Annotated[Ending, typer.Option("--format", help="Of the pictures.")] = Ending.png,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
     confidence: Annotated[float, typer.Option(help="Of the bounds that are told.")] = 0.9,
@@ -69,11 +70,14 @@ def campaign(
     from casadi_gnc.campaigns.keeping import FOLDER, Keep
     from casadi_gnc.errors import CampaignError
     from casadi_gnc.problem_files import by_name
+    from casadi_gnc.reports.style import check_page
 
+    if report is not None:
+        check_page(report)
     if problem == "show":
         if folder is None:
             raise CampaignError("which campaign? give its folder: casadi-gnc campaign show FOLDER")
-        _tell(by_name.open_campaign(folder), confidence, json, pictures, picture_format)
+        _tell(by_name.open_campaign(folder), confidence, json, pictures, picture_format, report)
         return
     if folder is not None:
         raise CampaignError(f"what is {str(folder)!r}? the folder of a campaign is given as --out {folder}")
@@ -103,13 +107,15 @@ def campaign(
         files = -(-made.identity["cases"] // made.identity["shard"])
         typer.echo(f"part {shard} has no cases: the campaign is {'one file' if files == 1 else f'{files} files'}")
         return
-    _tell(made, confidence, json, pictures, picture_format)
+    _tell(made, confidence, json, pictures, picture_format, report)
     if keep is not None and (made.folder / FOLDER).exists():
         count = len(list((made.folder / FOLDER).glob("*.npz")))
         typer.echo(f"kept {count} whole records in {made.folder / FOLDER}", err=json)
 
 
-def _tell(made: Campaign, confidence: float, json: bool, pictures: Path | None, ending: Ending) -> None:
+def _tell(
+    made: Campaign, confidence: float, json: bool, pictures: Path | None, ending: Ending, report: Path | None
+) -> None:
     """Print what a campaign says, and draw it where that is asked for."""
     if not json:
         print_summary(made, confidence)
@@ -120,3 +126,7 @@ def _tell(made: Campaign, confidence: float, json: bool, pictures: Path | None, 
 
         drawn = draw_campaign(made, pictures, confidence=confidence, ending=ending.value)
         typer.echo(f"drew {len(drawn)} pictures into {pictures}", err=json)
+    if report is not None:
+        from casadi_gnc.reports.campaign_page import of_campaign
+
+        typer.echo(f"wrote {of_campaign(made, report, confidence)}", err=json)

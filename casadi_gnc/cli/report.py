@@ -9,7 +9,7 @@ import typer
 
 
 def report(
-    what: Annotated[str, typer.Argument(help="A folder of flights, or a problem to check.")],
+    what: Annotated[str, typer.Argument(help="A folder of flights or of a campaign, or a problem to check.")],
     out: Annotated[Path, typer.Option(help="The page to write.")] = Path("report.html"),
 ) -> None:
     """Write one HTML page that needs nothing else: it works from disk, offline, and says what it lacks.

@@ -15,7 +15,7 @@ from casadi_gnc.system.templates import template
 #: Size of a chart and its margins, in units of its own.
 _WIDTH, _HEIGHT = 560, 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 66, 14, 12, 46
-Kind = Literal["line", "dots", "cross", "bars", "band", "rule"]
+Kind = Literal["line", "thick", "dots", "cross", "bars", "band", "rule"]
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Drawn:
 
     Parameters
     ----------
-    kind : a line, dots, crosses, bars up from zero at x of equal width, a band between two values of x, a rule.
+    kind : a line, a thick one, dots, crosses, bars up from zero between edges x, a band over two x, a rule.
     x, y : (K,); of a band two values of x; of a rule one value of x or of y, the other None.
     colour : of the page: c0 to c5, ink, quiet, good, warn, bad.
     label : what the reader is told, "" for nothing.
@@ -120,36 +120,40 @@ class Chart:
             a, b = self._right(one.x)
             path = f"M{a:g} {bottom}H{b:g}V{top}H{a:g}Z"
         else:
-            x, y = self._right(one.x), self._down(one.y)
-            good = np.isfinite(x) & np.isfinite(y)
-            path = _PATHS[one.kind](x, y, good, self._down(0.0) if one.kind == "bars" else 0.0)
+            x, y = np.atleast_1d(self._right(one.x)), np.atleast_1d(self._down(one.y))
+            path = _bars(x, y, float(self._down(0.0))) if one.kind == "bars" else _PATHS[one.kind](x, y)
         return {"kind": one.kind, "colour": one.colour, "path": path}
 
 
-def _line(x: np.ndarray, y: np.ndarray, good: np.ndarray, _: float) -> str:
+def _line(x: np.ndarray, y: np.ndarray) -> str:
     parts, pen = [], False
-    for a, b, there in zip(x, y, good, strict=True):
+    for a, b, there in zip(x, y, np.isfinite(x) & np.isfinite(y), strict=True):
         if there:
             parts.append(f"{'L' if pen else 'M'}{a:g} {b:g}")
         pen = bool(there)
     return "".join(parts)
 
 
-def _dots(x: np.ndarray, y: np.ndarray, good: np.ndarray, _: float) -> str:
-    # Points that fall on each other are one.
-    return "".join(f"M{a:g} {b:g}h0" for a, b in dict.fromkeys(zip(x[good].tolist(), y[good].tolist(), strict=True)))
+def _points(x: np.ndarray, y: np.ndarray) -> list[tuple[float, float]]:
+    """Return the points that are numbers; those that fall on each other are one."""
+    good = np.isfinite(x) & np.isfinite(y)
+    return list(dict.fromkeys(zip(x[good].tolist(), y[good].tolist(), strict=True)))
 
 
-def _crosses(x: np.ndarray, y: np.ndarray, good: np.ndarray, _: float) -> str:
-    return "".join(f"M{a - 4:g} {b - 4:g}l8 8m0 -8l-8 8" for a, b in zip(x[good], y[good], strict=True))
+def _dots(x: np.ndarray, y: np.ndarray) -> str:
+    return "".join(f"M{a:g} {b:g}h0" for a, b in _points(x, y))
 
 
-def _bars(x: np.ndarray, y: np.ndarray, good: np.ndarray, zero: float) -> str:
-    """Bars between edges: x has one more place than y."""
+def _crosses(x: np.ndarray, y: np.ndarray) -> str:
+    return "".join(f"M{a - 4:g} {b - 4:g}l8 8m0 -8l-8 8" for a, b in _points(x, y))
+
+
+def _bars(x: np.ndarray, y: np.ndarray, zero: float) -> str:
+    """Return bars between edges: x has one more place than y."""
     return "".join(f"M{x[k]:g} {zero:g}V{y[k]:g}H{x[k + 1]:g}V{zero:g}Z" for k in range(len(y)))
 
 
-_PATHS = {"line": _line, "dots": _dots, "cross": _crosses, "bars": _bars}
+_PATHS = {"line": _line, "thick": _line, "dots": _dots, "cross": _crosses}
 
 
 def around(*values: Any, room: float = 0.05) -> tuple[float, float]:

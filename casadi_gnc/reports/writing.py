@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from casadi_gnc.campaigns.store import IDENTITY
 from casadi_gnc.errors import ReportError
 from casadi_gnc.reports import flight_page, records
 from casadi_gnc.reports.style import check_page
@@ -15,7 +16,8 @@ def write_report(what: str | Path, target: str | Path) -> Path:
 
     Parameters
     ----------
-    what : a folder that `casadi-gnc fly` wrote, a mission or synthesis file, or the name of a shipped one.
+    what : a folder that `casadi-gnc fly` or `casadi-gnc campaign` wrote, a mission or synthesis file, or the name of a
+        shipped one.
     target : the page.
 
     Raises
@@ -26,11 +28,16 @@ def write_report(what: str | Path, target: str | Path) -> Path:
     page, source = Path(target), Path(what)
     check_page(page)
     if source.is_dir():
+        if (source / IDENTITY).exists():
+            from casadi_gnc.problem_files.by_name import open_campaign
+            from casadi_gnc.reports import campaign_page
+
+            return campaign_page.of_campaign(open_campaign(source), page)
         if records.is_flight_folder(source):
             return flight_page.of_folder(source, page)
         raise ReportError(
             f"{cut(str(what), 200)!r} is no folder with flights; expected one that `casadi-gnc fly PROBLEM --out "
-            "FOLDER` wrote"
+            "FOLDER` or `casadi-gnc campaign` wrote"
         )
     from casadi_gnc.problem_files.checking import checked_file
     from casadi_gnc.reports import check_page as checks
