@@ -60,6 +60,7 @@ lint: .venv/installed-dev
 # The pictures of the documentation, from flights made now.
 pictures: .venv/installed
 	$(BIN)/casadi-gnc fly problems/huang2020/slew.toml --out $(OUT)/slew
+	$(BIN)/casadi-gnc margins huang2020/slew --scheme pd_pinv --scheme funnel_robust --plot docs/images/margins.png
 	$(BIN)/casadi-gnc attainable problems/huang2020/allocation.toml --plot docs/images/attainable.png
 	cp $(OUT)/slew/funnel_robust.png docs/images/slew.png
 	$(BIN)/python docs/moving_picture.py docs/images/slew.gif

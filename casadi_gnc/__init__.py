@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from casadi_gnc.missions.requirements import Requirement, Verdict
     from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
     from casadi_gnc.missions.timing import Noise, Timing
-    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all, vary
+    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all, margins, vary
     from casadi_gnc.problem_files.document import shipped
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.signals import Layout, Signal
@@ -72,6 +72,7 @@ _HOMES = {
     "generate": "delivery.generating",
     "generate_fmu": "delivery.fmu",
     "load": "problem_files.loading",
+    "margins": "problem_files.by_name",
     "option": "laws",
     "shipped": "problem_files.document",
     "table": "tables.part",
@@ -113,6 +114,7 @@ __all__ = [
     "generate",
     "generate_fmu",
     "load",
+    "margins",
     "option",
     "shipped",
     "table",

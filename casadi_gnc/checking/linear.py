@@ -187,37 +187,6 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
     )
 
 
-def opened(loop: LinearLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return A, B and C of the loop cut between law and actuators: s' = A s + B v, w = C s, closed by v = w.
-
-    s is what is regulated, then the memory; v what the actuators are told, w what the law wants, (R,) each. s' is the
-    state one sample later, or the rate of s.
-    """
-    x0, m0 = loop.target
-    found: Any = _cut(loop.mission, loop.scheme)(loop.t, x0, m0)
-    a, b, c = (np.array(ca.DM(each).full()) for each in found)
-    return a, b, c
-
-
-def _cut(mission: Mission, scheme: Scheme) -> ca.Function:
-    """Return (t, x, m) -> the Jacobians of the loop that is cut between law and actuators, at what the law wants."""
-    loop = Loop(mission, scheme)
-    s, quiet, sampled = loop.symbols(), mission.quiet(), mission.timing.mode == "sampled"
-    y = loop.sensed(s.t, s.x, quiet)
-    seen = loop.seen(y)
-    remembered, wanted = loop.commanded(s.t, seen, s.m)
-    given, told = ca.SX.sym("given", wanted.numel()), ca.SX.sym("told", wanted.numel())
-    actuators = unlimited(mission, scheme, y, given)
-    x = loop.held(s.t, s.x, s.actuators, quiet) if sampled else loop.moved(s.t, s.x, s.actuators, quiet)
-    advance = loop.advanced if sampled else loop.flowing
-    later = advance(s.t, seen, remembered, wanted, told)
-    state = ca.vertcat(s.x[rows_of(mission)], s.m)
-    x = ca.substitute(x, s.actuators, actuators)[rows_of(mission)]
-    onward = ca.vertcat(x, ca.substitute(later, told, loop.made(y, actuators)))
-    slopes = [ca.jacobian(onward, state), ca.jacobian(onward, given), ca.jacobian(wanted, state)]
-    return ca.Function("cut", [s.t, s.x, s.m], [ca.substitute(each, given, wanted) for each in slopes])
-
-
 def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:
     """Return the least actuator commands that make the wanted effort, or come nearest to it, bounds left out."""
     matrix = scheme.actuation.matrix(mission.truth.measurement.split(y))
@@ -228,9 +197,14 @@ def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:
 
 def _without_still(matrix: np.ndarray, sampled: bool) -> np.ndarray:
     """Return the matrix without the states that stay what they are, whatever the others do."""
-    still = np.eye(len(matrix)) if sampled else np.zeros(matrix.shape)
-    moves = np.any(~np.isclose(matrix, still, rtol=0.0, atol=1e-12), axis=1) if matrix.size else np.zeros(0, dtype=bool)
+    moves = moving_rows(matrix, sampled)
     return matrix[np.ix_(moves, moves)]
+
+
+def moving_rows(matrix: np.ndarray, sampled: bool) -> np.ndarray:
+    """Return which states of a map, or a slope, do not stay what they are whatever the others do."""
+    still = np.eye(len(matrix)) if sampled else np.zeros(matrix.shape)
+    return np.any(~np.isclose(matrix, still, rtol=0.0, atol=1e-12), axis=1) if matrix.size else np.zeros(0, dtype=bool)
 
 
 def command_slope(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:

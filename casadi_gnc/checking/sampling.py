@@ -31,7 +31,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     yield from _jumps(mission, scheme)
     if not mission.target:
         return
-    loops = [loop_at(mission, scheme, t) for t in (0.0, _settled(mission))]
+    loops = [loop_at(mission, scheme, t) for t in (0.0, settled(mission))]
     # Printed laws may have gains beyond all numbers late in the flight: that is a finding, not a gap.
     if not loops[0].exists:
         yield Check(
@@ -91,7 +91,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     )
 
 
-def _settled(mission: Mission) -> float:
+def settled(mission: Mission) -> float:
     """Return the end of the flight [s], or a later time at which the funnels have their last width within 0.1 %.
 
     In between a loop may be unstable for a while that is too short to matter.

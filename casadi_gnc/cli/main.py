@@ -21,6 +21,7 @@ from casadi_gnc.cli import (
     doctor,
     fly,
     generate,
+    margins,
     new,
     problems,
     report,
@@ -61,6 +62,7 @@ app = typer.Typer(
 app.command("fly")(_about_its_file(fly.fly))
 app.command("campaign")(campaign.campaign)
 app.command("check")(check.check)
+app.command("margins")(_about_its_file(margins.margins))
 app.command("allocate")(_about_its_file(allocate.allocate))
 app.command("attainable")(_about_its_file(attainable.attainable))
 app.command("synthesize")(synthesize.synthesize)

@@ -21,6 +21,7 @@ from casadi_gnc.problem_files.loading import load
 
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.result import Campaign
+    from casadi_gnc.checking.broken_loops import SchemeMargins
 
 
 def mission_of(problem: Any, *, strict: bool = True) -> Mission:
@@ -75,6 +76,28 @@ def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Chec
     """
     with _about(problem):
         return checking.check(mission_of(problem, strict=False), scheme)
+
+
+def margins(problem: str | Path | Mission, scheme: str | None = None) -> list[SchemeMargins]:
+    """Return the stability margins of a mission's schemes, or of one of them, linearised at its target.
+
+    Raises
+    ------
+    FlightError
+        Where a scheme has none: no target, no slope there, or a loop that is not stable.
+
+    Examples
+    --------
+    >>> (found,) = margins("huang2020/slew", "pd_pinv")
+    >>> found.channels["torque 1"].gain_high > 20
+    True
+    """
+    from casadi_gnc.checking.broken_loops import scheme_margins
+
+    with _about(problem):
+        mission = mission_of(problem)
+        chosen = mission.schemes if scheme is None else (mission.scheme(scheme),)
+        return [scheme_margins(mission, one) for one in chosen]
 
 
 def vary(

@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from casadi_gnc.checking.broken_loops import SchemeMargins, scheme_margins
 from casadi_gnc.checking.linear import LinearLoop, loop_at
-from casadi_gnc.checking.margins import AxisMargins, margins
+from casadi_gnc.checking.sampling import settled
+from casadi_gnc.checking.margins import BrokenLoop, Margins
 from casadi_gnc.checks import VERDICTS, Check, worst
+from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.reports import page
 from casadi_gnc.reports.charts import Axis, Chart, Drawn, around
@@ -123,32 +126,42 @@ def _row(group: Sequence[Check], schemes: Sequence[str]) -> dict[str, Any]:
 
 
 def _loop(mission: Mission, name: str) -> dict[str, Any]:
-    """Return poles and margins of a scheme's loop, linearised at its target at the end of the flight."""
+    """Return poles and margins of a scheme's loop, linearised at its target when funnels have stopped narrowing."""
     scheme = mission.scheme(name)
-    loop = loop_at(mission, scheme, mission.timing.duration)
+    loop = loop_at(mission, scheme, settled(mission))
     if not loop.matrix.size or not loop.exists:
-        return {
-            "scheme": scheme.title or name,
-            "told": "The loop has no slope at its target, so it has neither poles nor margins.",
-            "charts": [],
-            "rows": [],
-        }
-    found = margins(loop)
+        told = "The loop has no slope at its target, so it has neither poles nor margins."
+        return {"scheme": scheme.title or name, "told": told, "charts": [], "rows": []}
+    try:
+        found = scheme_margins(mission, scheme)
+    except FlightError as error:
+        told = f"{str(error)[:1].upper()}{str(error)[1:]}."
+        return {"scheme": scheme.title or name, "told": told, "charts": [_poles(loop).svg()], "rows": []}
     return {
         "scheme": scheme.title or name,
-        "told": _told(loop),
+        "told": _told(loop, found),
         "charts": [one.svg() for one in (_poles(loop), _nichols(found), *_bode(found))],
-        "rows": [_margin_row(one) for one in found],
+        "rows": [_margin_row(channel, one) for channel, one in found.channels.items()],
     }
 
 
-def _told(loop: LinearLoop) -> str:
-    where = f"at its target at {loop.t:g} s, with actuators that do what they are told"
-    cut = "cut where the law hands its effort to the actuators, one axis at a time, the others closed"
-    return f"Linearised {where}; margins are those of the loop {cut}. They say nothing of clipped efforts."
+def _told(loop: LinearLoop, found: SchemeMargins) -> str:
+    ends = f"{found.effort_low:.3g} and {found.effort_high:.3g}" if math.isfinite(found.effort_high) else ""
+    together = (
+        f"between {ends}"
+        if ends
+        else f"above {found.effort_low:.3g}"
+        if found.effort_low
+        else "whatever that factor is"
+    )
+    return (
+        f"Linearised at its target at {loop.t:g} s, with actuators that are not at their limits; each row is the loop cut at "
+        f"that effort or measurement, the others closed. With one factor between the true and the commanded effort on every "
+        f"axis it is stable {together}."
+    )
 
 
-def _margin_row(one: AxisMargins) -> list[str]:
+def _margin_row(channel: str, one: Margins) -> list[str]:
     def shown(value: float, unit: str = "") -> str:
         return f"{value:.4g}{unit}" if math.isfinite(value) else "none"
 
@@ -156,13 +169,14 @@ def _margin_row(one: AxisMargins) -> list[str]:
         return f"{value:.4g} ({20 * math.log10(value):+.1f} dB)" if math.isfinite(value) and value > 0 else "none"
 
     return [
-        one.axis,
+        channel,
         decibel(one.gain_low),
         decibel(one.gain_high),
-        shown(math.degrees(one.phase), "°"),
+        "none" if math.isnan(one.phase_at) else shown(math.degrees(one.phase), "°"),
+        shown(one.phase_at, " rad/s"),
         shown(one.delay, " s"),
-        shown(one.distance),
-        shown(one.crossing, " rad/s"),
+        shown(one.modulus),
+        shown(one.disk),
     ]
 
 
@@ -183,34 +197,38 @@ def _poles(loop: LinearLoop) -> Chart:
     return Chart("Poles of the closed loop", *ends, [rule, crosses])
 
 
-def _seen(one: AxisMargins) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frequency, gain [dB] and phase [deg] of a curve, few enough points; the phase without jumps."""
-    some = slice(None, None, 8)
-    size = 20 * np.log10(np.maximum(np.abs(one.response), 1e-30))
-    phase = np.degrees(np.unwrap(np.angle(one.response)))
+def _curves(found: SchemeMargins) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
+    """Return name, frequency, gain [dB] and phase [deg] of the loop cut at each effort, few enough points."""
+    return [(name, *_seen(found.loop.channel(i))) for i, name in enumerate(list(found.channels)[: found.loop.channels])]
+
+
+def _seen(loop: BrokenLoop) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    grid = loop.frequencies()
+    response = loop.at(grid)[:, 0, 0]
+    size = 20 * np.log10(np.maximum(np.abs(response), 1e-30))
+    phase = np.degrees(np.unwrap(np.angle(response)))
     middle = phase[np.argmin(np.abs(size))]
-    return one.frequency[some], size[some], (phase - 360.0 * round((middle + 180.0) / 360.0))[some]
+    some = slice(None, None, 6)
+    return grid[some], size[some], (phase - 360.0 * round((middle + 180.0) / 360.0))[some]
 
 
-def _nichols(found: Sequence[AxisMargins]) -> Chart:
+def _nichols(found: SchemeMargins) -> Chart:
     drawn = [
         Drawn("line", np.where(np.abs(phase + 180) < 190, phase, np.nan), np.where(np.abs(size) < 42, size, np.nan),
-              f"c{i % 6}", one.axis)
-        for i, one in enumerate(found)
-        for _, size, phase in [_seen(one)]
+              f"c{i % 6}", name)
+        for i, (name, _, size, phase) in enumerate(_curves(found))
     ]  # fmt: skip
     point = Drawn("cross", np.array([-180.0]), np.array([0.0]), "bad", "-1")
     return Chart("Nichols", Axis("phase [deg]", -360, 0), Axis("gain [dB]", -40, 40), [*drawn, point])
 
 
-def _bode(found: Sequence[AxisMargins]) -> list[Chart]:
-    lowest, highest = found[0].frequency[0], found[0].frequency[-1]
+def _bode(found: SchemeMargins) -> list[Chart]:
+    curves, gains, phases = _curves(found), [], []
+    lowest, highest = min(at[0] for _, at, _, _ in curves), max(at[-1] for _, at, _, _ in curves)
     across = Axis("frequency [rad/s]", float(lowest), float(highest), logarithmic=True)
-    gains, phases = [], []
-    for i, one in enumerate(found):
-        at, size, phase = _seen(one)
-        gains.append(Drawn("line", at, np.clip(size, -100, 140), f"c{i % 6}", one.axis))
-        phases.append(Drawn("line", at, np.where(np.abs(phase + 180) < 361, phase, np.nan), f"c{i % 6}", one.axis))
+    for i, (name, at, size, phase) in enumerate(curves):
+        gains.append(Drawn("line", at, np.clip(size, -100, 140), f"c{i % 6}", name))
+        phases.append(Drawn("line", at, np.where(np.abs(phase + 180) < 361, phase, np.nan), f"c{i % 6}", name))
     gain = Axis("gain [dB]", *around(*[one.y for one in gains]))
     phase = Axis("phase [deg]", *around(*[one.y for one in phases], [-180.0]))
     levels = [Drawn("rule", None, level, "quiet") for level in (0.0, -180.0)]

@@ -1,0 +1,110 @@
+"""`casadi-gnc margins`: how much gain, phase and delay the loops of a mission bear."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from casadi_gnc.checking.broken_loops import SchemeMargins
+
+
+def margins(
+    problem: Annotated[str, typer.Argument(help="A mission file, or the name of a shipped one.")],
+    scheme: Annotated[list[str] | None, typer.Option(help="Only this scheme; may be repeated.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw Nichols and Bode pictures into this file (.png, .svg).")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
+) -> None:
+    """Show gain, phase, delay, modulus and disk margins of each effort and measurement, sampled as it flies."""
+    from casadi_gnc.checking.broken_loops import scheme_margins
+    from casadi_gnc.errors import FlightError
+    from casadi_gnc.problem_files.loading import load
+
+    mission = load(problem)
+    found, lacking = [], []
+    for one in [mission.scheme(name) for name in scheme] if scheme else mission.schemes:
+        try:
+            found.append(scheme_margins(mission, one))
+        except FlightError as error:
+            lacking.append(str(error))
+    if not found:
+        raise FlightError("; ".join(lacking))
+    if plot is not None:
+        from casadi_gnc.reports.margins_picture import draw
+
+        draw(mission.title or mission.name, found, plot)
+    if json:
+        _print_json(mission.title, found, lacking)
+        return
+    _print(mission.title or mission.name, found)
+    for sentence in lacking:
+        typer.echo(f"note: {sentence}")
+    if plot is not None:
+        typer.echo(f"wrote {plot}")
+
+
+def _print(title: str, found: list[SchemeMargins]) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(title=escape(title), title_justify="left")
+    for name in ("loop cut at", "gain from", "to", "phase [deg]", "at [rad/s]", "delay [s]", "modulus", "disk"):
+        table.add_column(escape(name), justify="left" if name == "loop cut at" else "right", no_wrap=True)
+    for one in found:
+        table.add_section()
+        table.add_row(f"[bold]{escape(one.scheme)}[/]")
+        for name, m in one.channels.items():
+            phase = "none" if math.isnan(m.phase_at) else f"{math.degrees(m.phase):.1f}"
+            at = "" if math.isnan(m.phase_at) else f"{m.phase_at:.3g}"
+            table.add_row(
+                escape(name), f"{m.gain_low:.3g}", _or_any(m.gain_high), phase, at, _or_any(m.delay),
+                f"{m.modulus:.3f}", f"{m.disk:.3f}",
+            )  # fmt: skip
+    # Nothing is cut, however narrow the terminal: a line that is too long runs on.
+    console = Console(soft_wrap=True)
+    console.width = max(console.width, Console(width=1000).measure(table).maximum)
+    console.print(table, soft_wrap=False, crop=False)
+    for one in found:
+        high = f"up to {one.effort_high:.3g}" if math.isfinite(one.effort_high) else "without an upper end"
+        low = f"from {one.effort_low:.3g}" if one.effort_low else "from 0"
+        console.print(
+            f"{one.scheme}: stable for (true effort)/(commanded effort), all alike, {low} {high}; "
+            f"every effort by a factor of its own within the disk {one.disk_of_efforts:.3g}",
+            markup=False,
+            highlight=False,
+        )
+
+
+def _or_any(value: float) -> str:
+    return f"{value:.3g}" if math.isfinite(value) else "any"
+
+
+def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> None:
+    import dataclasses
+    import json as encoder
+
+    def number(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    def data(one: SchemeMargins) -> dict[str, Any]:
+        channels = {
+            name: {key: number(value) for key, value in dataclasses.asdict(m).items()}
+            for name, m in one.channels.items()
+        }
+        return {
+            "scheme": one.scheme,
+            "linearised_at_s": one.at_s,
+            "channels": channels,
+            "effort_low": one.effort_low,
+            "effort_high": number(one.effort_high),
+            "disk_of_efforts": one.disk_of_efforts,
+        }
+
+    content = {"problem": title, "schemes": [data(one) for one in found], "notes": lacking}
+    typer.echo(encoder.dumps(content, indent=2, allow_nan=False))
