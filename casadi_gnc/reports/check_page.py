@@ -11,8 +11,8 @@ import numpy as np
 
 from casadi_gnc.checking.broken_loops import SchemeMargins, scheme_margins
 from casadi_gnc.checking.linear import LinearLoop, loop_at
-from casadi_gnc.checking.sampling import settled
 from casadi_gnc.checking.margins import BrokenLoop, Margins
+from casadi_gnc.checking.sampling import settled
 from casadi_gnc.checks import VERDICTS, Check, worst
 from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.mission import Mission
@@ -155,9 +155,9 @@ def _told(loop: LinearLoop, found: SchemeMargins) -> str:
         else "whatever that factor is"
     )
     return (
-        f"Linearised at its target at {loop.t:g} s, with actuators that are not at their limits; each row is the loop cut at "
-        f"that effort or measurement, the others closed. With one factor between the true and the commanded effort on every "
-        f"axis it is stable {together}."
+        f"Linearised at its target at {loop.t:g} s, with actuators that are not at their limits; each row is the loop cut "
+        f"at that effort or measurement, the others closed. With one factor between the true and the commanded effort on "
+        f"every axis it is stable {together}."
     )
 
 
