@@ -155,9 +155,9 @@ def _told(loop: LinearLoop, found: SchemeMargins) -> str:
         else "whatever that factor is"
     )
     return (
-        f"Linearised at its target at {loop.t:g} s, with actuators that are not at their limits; each row is the loop cut "
-        f"at that effort or measurement, the others closed. With one factor between the true and the commanded effort on "
-        f"every axis it is stable {together}."
+        f"Linearised at its target at {loop.t:g} s, with actuators that are not at their limits; each row is the loop "
+        "cut at that effort or measurement, the others closed. With one factor between the true and the commanded "
+        f"effort on every axis it is stable {together}."
     )
 
 
