@@ -28,7 +28,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         span,
         0.0,
         "-",
-        "note" if np.isnan(span) else "fail",
+        "note" if np.isnan(span) or callable(scheme.actuation.effectiveness) else "fail",
         "The actuators cannot make some effort at all, however little of it: the craft drifts off that way.",
         "Add or turn an actuator so that every direction of effort can be made.",
         "least share of what all actuators make of a row of effort at most, with the other rows at zero",

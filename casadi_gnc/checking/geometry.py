@@ -26,12 +26,14 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     matrix = scale(scheme) @ believed(mission, scheme)
     strength = np.linalg.svd(matrix, compute_uv=False)
     rank_gap = float(strength[-1] / strength[0]) if strength[0] > 0 else 0.0
+    # Where it follows the measurement, it is another a moment later: what one moment lacks is no failure of the craft.
+    follows = callable(scheme.actuation.effectiveness)
     yield Check(
         "geometry.effectiveness",
         rank_gap,
         1e-6,
         "-",
-        "fail",
+        "note" if follows else "fail",
         "Some effort cannot be made by any combination of the actuators.",
         "Add or turn an actuator.",
         "smallest over largest singular value of the effectiveness, rows scaled by their limits",
@@ -43,7 +45,7 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         conditioning,
         _WELL_CONDITIONED,
         "-",
-        "warn",
+        "note" if follows else "warn",
         "Some effort costs the actuators very much more than another.",
         "Turn the actuators, or fit the limits of the effort to what the actuators make.",
         "condition number of the effectiveness, rows scaled by their limits",

@@ -10,6 +10,8 @@ from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
+from . import budgets
+
 if TYPE_CHECKING:
     from .craft import SatelliteCraft
 
@@ -18,7 +20,8 @@ _STEPS = 20
 
 
 def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield whether modes and liquids are slow enough for the sampling and the integrator."""
+    """Yield momentum, slews and coils, and whether modes and liquids are slow enough for sampling and integrator."""
+    yield from budgets.checks(craft, mission)
     timing = mission.timing
     swings = [("flexible_mode", i, each.frequency_Hz) for i, each in enumerate(craft.flexible_mode, 1)]
     swings += [("slosh", i, each.frequency_Hz) for i, each in enumerate(craft.slosh, 1)]

@@ -263,6 +263,8 @@ class SatelliteCraft(Craft):
     def regulated(self, mission: Mission) -> dict[str, list[float]]:
         """Return the attitude of a reference that stays, and rest; of one that moves, nothing."""
         pointed = self.pointed()
+        if not self.wheel and not self.thruster:
+            return {}  # coils alone hold no attitude at any one time
         if type(pointed) not in (Reference, Inertial):
             return {}
         still = array(pointed.at(0.0, None).quaternion)
