@@ -9,10 +9,12 @@ import typer
 
 
 def report(
-    what: Annotated[str, typer.Argument(help="A folder of flights or of a campaign, or a problem to check.")],
+    what: Annotated[str, typer.Argument(help="A folder of flights, a campaign or a package; or a problem.")],
     out: Annotated[Path, typer.Option(help="The page to write.")] = Path("report.html"),
 ) -> None:
     """Write one HTML page that needs nothing else: it works from disk, offline, and says what it lacks.
+
+    A problem is checked, and a package verified on this machine, which runs the code that it keeps with your rights.
 
     Examples
     --------
@@ -20,6 +22,17 @@ def report(
 
     casadi-gnc report huang2020/detumble --out checks.html
     """
-    from casadi_gnc.reports.writing import write_report
+    from casadi_gnc.reports import writing
+    from casadi_gnc.reports.style import check_page
 
-    typer.echo(f"wrote {write_report(what, out)}")
+    check_page(out)
+    is_package = writing.is_package(Path(what))
+    typer.echo(f"wrote {_of_package(Path(what), out) if is_package else writing.write_report(what, out)}")
+
+
+def _of_package(package: Path, out: Path) -> Path:
+    """Verify a package on this machine, and write the page of that."""
+    from casadi_gnc.delivery.verifying import verify
+    from casadi_gnc.reports.package_page import of_verification
+
+    return of_verification(verify(package), out)

@@ -14,7 +14,7 @@ def verify(
         str, typer.Option(help="host and names of targets, apart by commas; all: every target.")
     ] = "host",
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
-    report: Annotated[Path | None, typer.Option(help="Write an HTML report.")] = None,
+    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
 ) -> None:
     """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs.
 
@@ -22,13 +22,18 @@ def verify(
     """
     from casadi_gnc.delivery.verifying import verify as run
     from casadi_gnc.embedded import boards
+    from casadi_gnc.reports.style import check_page
 
+    if report is not None:
+        check_page(report)
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
     if "all" in wanted:
         wanted = ["host", *boards.names()]
     found = run(package, wanted)
     if report is not None:
-        _write(report, found)
+        from casadi_gnc.reports.package_page import of_verification
+
+        of_verification(found, report)
     if json:
         import json as encoder
 
@@ -39,14 +44,6 @@ def verify(
             typer.echo(f"wrote {report}")
     if not found["is_sound"]:
         raise typer.Exit(1)
-
-
-def _write(path: Path, found: dict[str, Any]) -> None:
-    from casadi_gnc.embedded.report import render_report
-    from casadi_gnc.system.files import prepare_folder, write_beside
-
-    prepare_folder(path.parent)
-    write_beside(path, lambda place: place.write_text(render_report(found), encoding="utf-8"))
 
 
 def _print(found: dict[str, Any]) -> None:

@@ -5,10 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from casadi_gnc.campaigns.store import IDENTITY
+from casadi_gnc.embedded.manifest import MANIFEST
 from casadi_gnc.errors import ReportError
 from casadi_gnc.reports import flight_page, records
 from casadi_gnc.reports.style import check_page
 from casadi_gnc.tables.wording import cut
+
+
+def is_package(folder: Path) -> bool:
+    """Return whether a folder has the manifest of a flight package; its page is that of its verification."""
+    return (folder / MANIFEST).is_file()
 
 
 def write_report(what: str | Path, target: str | Path) -> Path:
