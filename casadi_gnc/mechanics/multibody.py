@@ -36,7 +36,7 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mathematics.exact import array, is_zero
 from casadi_gnc.mathematics.linear import solve_symmetric
 from casadi_gnc.signals import Layout
 
@@ -90,7 +90,7 @@ class Component:
         return 0.0
 
     def moment(self, own: Any) -> Any:
-        """Return its first moment m r, (3,), [kg m]."""
+        """Return its first moment m r, (3,), [kg m]; of a part without mass it does not count."""
         return ca.DM.zeros(3)
 
     def inertia(self, own: Any) -> Any:
@@ -154,8 +154,15 @@ class Assembly:
         """The whole mass, [kg]."""
         return self.body_mass + sum(part.mass() for part in self.components)
 
+    @property
+    def _is_all_of_body(self) -> bool:
+        """Whether no part has mass of its own: then the centre of mass stays, without any rounding."""
+        return all(is_zero(part.mass()) for part in self.components)
+
     def centre(self, own: Any) -> Any:
         """Return c, (3,), [m], at a state of the parts."""
+        if self._is_all_of_body:
+            return array(self.body_centre)
         moment = self.body_mass * array(self.body_centre)
         for part in self.components:
             moment = moment + part.moment(own)
@@ -163,10 +170,12 @@ class Assembly:
 
     def inertia(self, own: Any) -> Any:
         """Return J_c, (3, 3), [kg m^2]."""
-        total = array(self.body_inertia) + about_origin(self.body_mass, self.body_centre)
+        total = array(self.body_inertia)
         for part in self.components:
             total = total + part.inertia(own)
-        return total - about_origin(self.mass, self.centre(own))
+        if self._is_all_of_body:
+            return total
+        return total + about_origin(self.body_mass, self.body_centre) - about_origin(self.mass, self.centre(own))
 
     def _inner(self, own: Any) -> tuple[Any, Any, Any]:
         """Return A_c, M_c and P."""

@@ -73,6 +73,8 @@ class Elements:
     mu: float = EARTH_MU
 
     def __post_init__(self) -> None:
+        if not all(map(exact.is_number, (self.semi_major_axis, self.eccentricity))):
+            return
         if not (self.semi_major_axis > 0 and math.isfinite(self.semi_major_axis)):
             raise FlightError(f"the semi-major axis is {self.semi_major_axis}, expected a positive number of metres")
         if not 0 <= self.eccentricity < 1:
@@ -96,13 +98,13 @@ class Elements:
         parameter = self.semi_major_axis * (1 - e * e)
         distance, speed = parameter / (1 + e * along), exact.sqrt(self.mu / parameter)
         turn = self._plane()
-        place = ca.DM([distance * along, distance * across, 0])
-        return ca.mtimes(turn, place), ca.mtimes(turn, ca.DM([-speed * across, speed * (e + along), 0]))
+        place = exact.array([distance * along, distance * across, 0])
+        return ca.mtimes(turn, place), ca.mtimes(turn, exact.array([-speed * across, speed * (e + along), 0]))
 
     def _plane(self) -> ca.DM:
         """Return the matrix, (3, 3), from perigee, its normal in the plane, and the plane's, to the inertial frame."""
         (cn, sn), (ci, si), (cw, sw) = (exact.cos_sin(each) for each in (self.node, self.inclination, self.perigee))
-        return ca.DM(
+        return exact.array(
             [
                 [cn * cw - sn * sw * ci, -cn * sw - sn * cw * ci, sn * si],
                 [sn * cw + cn * sw * ci, -sn * sw + cn * cw * ci, -cn * si],

@@ -32,6 +32,11 @@ from casadi_gnc.status import StepStatus
 CREDIBLE_SPEED = 1e5
 
 
+def endless(speed: Any) -> bool:
+    """Return whether a largest speed is none; a symbol is one."""
+    return is_number(speed) and float(speed) == math.inf
+
+
 @dataclass(frozen=True, eq=False)
 class Wheels(Component):
     """N wheels; the command u of each is its motor's torque, which the body feels as -u along the axis.
@@ -99,7 +104,7 @@ class Wheels(Component):
         made = []
         for i, fastest in enumerate(self._fastest()):
             u, speed = told.wheel_torque[i], own.wheel_speed[i]
-            if is_number(fastest) and float(fastest) == math.inf:
+            if endless(fastest):
                 made.append(u)
             else:
                 made.append(ca.if_else(ca.logic_and(ca.fabs(speed) >= fastest, u * speed > 0), 0.0, u))
@@ -115,8 +120,7 @@ class Wheels(Component):
 
     def flags(self, own: Any, told: Any) -> dict[Any, Any]:
         """Return whether a wheel is at its limit."""
-        limits = [v for v in self._fastest() if not (is_number(v) and float(v) == math.inf)]
-        if not limits:
+        if all(map(endless, self._fastest())):
             return {}
         return {StepStatus.WHEEL_SATURATED: any_of(ca.fabs(own.wheel_speed) >= array(self.max_speed))}
 

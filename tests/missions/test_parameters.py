@@ -22,6 +22,14 @@ KEYS = {
     "shi2020/docking": ("iobc", ["spacecraft.target_mass_kg", "orbit.eccentricity", "sensors.position_deviation_m"]),
     "sun2018/circular_orbit": (None, ["spacecraft.mass_kg", "target.inertia_kg_m2", "initial.position_error_m"]),
     "tao2019/case1": (None, ["spacecraft.mass_kg", "environment.constant.*", "orbit.altitude_m", "initial.mrp"]),
+    "satellites/thruster_hold": (
+        "robust",
+        ["truth.centre_of_mass_error_m", "slosh.1.frequency_Hz", "initial.rate_deg_per_s"],
+    ),
+    "satellites/earth_pointing": (
+        "mrp",
+        ["orbit.altitude_m", "sensor.1.bias_rad_per_s", "initial.euler_321_deg", "wheel.1.max_momentum_N_m_s"],
+    ),
 }
 
 

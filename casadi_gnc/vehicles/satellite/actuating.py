@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,9 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.allocation import AllocationProblem, Direct
+from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.exact import array, is_number, is_zero
+from casadi_gnc.mechanics.satellite_parts import endless
 from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import EffortKeys
 from casadi_gnc.tables.allocation import Robust
@@ -47,7 +48,7 @@ def actuators(craft: SatelliteCraft, centre: Any) -> Actuators:
         effectiveness = TorqueByField(fixed, part_tables.directions(craft.magnetorquer, "axis"))
     speeds = tuple(each.max_speed for each in craft.wheel)
     limits = None
-    if any(not is_number(speed) or speed != math.inf for speed in speeds):
+    if not all(map(endless, speeds)):
         spin = tuple(each.spin_inertia for each in craft.wheel)
         limits = WheelLimits(speeds, spin, tuple(lower), tuple(upper))
     return Actuators(
@@ -108,7 +109,9 @@ def actuation(craft: SatelliteCraft, known: Actuators, told: EffortKeys) -> Actu
         if callable(known.effectiveness):
             message = "the torque of coils follows the field, and robust allocation needs one that stays"
             raise MisfitError(message, "allocation", "method")
-        effectiveness = known.effectiveness.full()
+        if not is_number(known.effectiveness):
+            raise FlightError("robust allocation is made for one effectiveness; take method pinv to vary it")
+        effectiveness = np.array(known.effectiveness)
         problem = AllocationProblem(effectiveness, lower=known.lower, upper=known.upper, **keys.weights())
         return Actuation.of(known, limit, keys.allocator(problem))
     if shared is not None:
@@ -124,6 +127,8 @@ def _most(craft: SatelliteCraft, known: Actuators) -> list[float]:
         strength = _FIELD * sum(each.max_dipole_A_m2 for each in craft.magnetorquer)
         fixed, most = fixed.fixed, [strength] * 3
     bound = [max(abs(low), abs(high)) for low, high in zip(known.lower, known.upper, strict=True)]
+    if not is_number(fixed):
+        raise FlightError("the largest torques follow from it; give effort_limit in the scheme")
     made = ca.mtimes(ca.fabs(fixed), ca.DM(bound[: fixed.shape[1]]))
     return [value + own for value, own in zip(most, ca.DM(made).elements(), strict=True)]
 

@@ -55,7 +55,7 @@ class Attitude(Part):
         if self.mrp is not None:
             return quaternions.from_mrp(exact.array(self.mrp))
         if self.axis is not None:
-            angle = self.angle_rad if self.angle_rad is not None else DEGREE * (self.angle_deg or 0.0)
+            angle = DEGREE * self.angle_deg if self.angle_deg is not None else self.angle_rad
             return _unit(quaternions.from_axis_angle(_unit(exact.array(self.axis)), angle))
         if self.euler_321_rad is not None:
             return quaternions.from_321(*self.euler_321_rad)

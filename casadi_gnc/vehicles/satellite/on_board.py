@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
 from casadi_gnc.mathematics import bounds
+from casadi_gnc.mechanics.satellite_parts import endless
 from casadi_gnc.status import StepStatus
 
 #: Share of the limit from which a wheel counts as saturated, less one.
@@ -53,7 +53,7 @@ class WheelLimits:
         """Return bounds of all commands within which no motor drives its wheel past the limit in one period [s]."""
         least, most = list(self.lower), list(self.upper)
         for i, (fastest, spin) in enumerate(zip(self.speeds, self.spin, strict=True)):
-            if fastest != math.inf:
+            if not endless(fastest):
                 speed = seen.wheel_speed[i]
                 least[i] = bounds.clip((-fastest - speed) * spin / period, self.lower[i], self.upper[i])
                 most[i] = bounds.clip((fastest - speed) * spin / period, self.lower[i], self.upper[i])
@@ -64,6 +64,6 @@ class WheelLimits:
         full = [
             ca.fabs(seen.wheel_speed[i]) >= (1 - _NEAR) * fastest
             for i, fastest in enumerate(self.speeds)
-            if fastest != math.inf
+            if not endless(fastest)
         ]
         return {StepStatus.WHEEL_SATURATED: bounds.any_of(ca.vertcat(*full))}

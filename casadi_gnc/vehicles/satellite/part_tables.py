@@ -61,7 +61,9 @@ class WheelTable(Axial):
         """J_s, [kg m^2]."""
         if self.inertia_kg_m2 is not None:
             return self.inertia_kg_m2
-        return (self.max_momentum_N_m_s or 0.0) / (self.max_speed_rad_per_s or 1.0)
+        assert self.max_momentum_N_m_s is not None  # as `_one_inertia` has it
+        assert self.max_speed_rad_per_s is not None
+        return self.max_momentum_N_m_s / self.max_speed_rad_per_s
 
     @property
     def max_speed(self) -> Any:
