@@ -57,7 +57,7 @@ def generate_function(
     state : input -> output that is its next value.
     ports : port -> table of "unit", "note", and of a state's "initial" value.
     rate : steps a second.
-    vectors : inputs of the shipped steps: (K, inputs), or a CSV whose columns are called as the members of the input,
+    vectors : what the shipped steps are given: (K, inputs), or a CSV whose columns are called as the members of the input,
         `x[0]`, matrices column by column. Without them numbers between -1 and 1, the last ones with bad numbers.
     target : targets to measure for the README.
     steps : how many, without `vectors`; 1024 by default.
