@@ -57,8 +57,8 @@ def generate_function(
     state : input -> output that is its next value.
     ports : port -> table of "unit", "note", and of a state's "initial" value.
     rate : steps a second.
-    vectors : what the shipped steps are given: (K, inputs), or a CSV whose columns are called as the members of the input,
-        `x[0]`, matrices column by column. Without them numbers between -1 and 1, the last ones with bad numbers.
+    vectors : what the shipped steps are given, (K, columns), or a CSV with columns that are called as members of the
+        input, `x[0]`, matrices column by column. Without them numbers between -1 and 1, the last ones with bad numbers.
     target : targets to measure for the README.
     steps : how many, without `vectors`; 1024 by default.
     force : overwrite a package that was edited.

@@ -21,8 +21,9 @@ Each measurement that is valid corrects (a, e) by scalars, with the slopes
     star tracker   z = 4 mrp(q_measured q^-1) in its own frame,   H = C_mounting
     unit vector    z = measured - C(q) known,                     H = [C(q) known]x
 
-and then q = dq(a) q, b = b + e, a = e = 0. The turn dq(a) is made by MRPs a/4, which is a turn by a but for abs(a)^3/48,
-and needs no trigonometry. A measurement that is further from the estimate than `gate` standard deviations is
+and then q = dq(a) q, b = b + e, a = e = 0. The turn dq(a) is made by MRPs a/4, which is a turn by a but for
+abs(a)^3/48 and needs no trigonometry. A measurement that is further from the estimate than `gate` standard deviations
+is
 left out; after `patience` samples of which none fits, the filter goes on with its first covariance.
 
 A direction is linear in small errors only: what is left out is of the size of a^2/2, and is taken for further noise
