@@ -134,6 +134,12 @@ def refuse(mission: Mission) -> None:
         if funnel.signal not in plant.measurement:
             known = ", ".join(plant.measurement.names)
             raise FlightError(f"there is a funnel of {funnel.signal!r}, which is not measured; there is {known}")
+        for scheme in mission.schemes:
+            if scheme.navigation is not None and funnel.signal in scheme.navigation.changed:
+                raise FlightError(
+                    f"the funnel bounds {funnel.signal!r} as it is measured, and the law of scheme {scheme.name!r} "
+                    "reads it from the reference; leave out the funnel, or the reference"
+                )
 
 
 def refuse_requirements(mission: Mission) -> None:

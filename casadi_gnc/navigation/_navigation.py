@@ -38,6 +38,11 @@ class Navigation:
     #: What it shows besides, for records and plots.
     outputs: ClassVar[Any] = Layout()
 
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Names of signals that are measured too and mean something else there."""
+        return ()
+
     def start(self, t: Any, y: Any) -> Any:
         """Return the memory at the first measurement y."""
         return ca.DM.zeros(self.memory.size)
@@ -111,6 +116,11 @@ class Reference:
 
     #: Measured signals that it needs: some of position (3) [m] and velocity (3) [m/s], inertial.
     reads: Any = Layout()
+
+    @property
+    def is_inertial(self) -> bool:
+        """Whether the reference frame is the inertial one, always."""
+        return type(self) is Reference
 
     def at(self, t: Any, known: Any) -> Wanted:
         """Return what is wanted at time t [s]; `known` has the signals of `reads` by name."""

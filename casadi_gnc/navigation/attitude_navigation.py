@@ -73,6 +73,11 @@ class AttitudeNavigation(Navigation):
         """The estimator's."""
         return Layout() if self.estimator is None else self.estimator.outputs
 
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Attitude and rate, which are measured from inertial."""
+        return () if self.reference.is_inertial else ("mrp", "rate")
+
     def start(self, t: Any, y: Any) -> Any:
         """Return the estimator's memory."""
         return ca.DM.zeros(0, 1) if self.estimator is None else self.estimator.start(t, self._read(y))

@@ -24,7 +24,7 @@ from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.mechanics import earth, orbits, quaternions
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.navigation._navigation import Reference, Wanted
@@ -67,6 +67,11 @@ class Inertial(Reference):
     """
 
     quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0)
+
+    @property
+    def is_inertial(self) -> bool:
+        """Whether it is no turn."""
+        return all(is_number(value) and float(value) == 0 for value in list(self.quaternion)[1:])
 
     def at(self, t: Any, known: Any) -> Wanted:
         """Return the attitude, at rest."""

@@ -262,3 +262,31 @@ def test_a_day_of_looking_at_the_earth():
     still = casadi_gnc.load("satellites/earth_pointing_day", {"momentum.unload_per_s": 0.0})
     loaded = casadi_gnc.fly(still)
     assert np.abs(loaded["wheel_speed"][-1]).max() > 1.5 * speeds.max()
+
+
+FUNNEL = """
+[[funnel]]
+signal = "mrp"
+start = [0.6, 0.6, 0.6]
+floor = [0.02, 0.02, 0.02]
+decay_per_s = [0.02, 0.02, 0.02]
+below = [1.0, 1.0, 1.0]
+above = [1.0, 1.0, 1.0]
+"""
+PAPER = (
+    'law = { type = "prescribed_performance", attitude_gain = 0.05, rate_gain = 0.5, compensator_gain = 0.0, '
+    "compensator_decay = 0.1, observer_gain = 0.2, filter_time_constant = 1.0 }"
+)
+
+
+def test_a_law_with_a_funnel_keeps_it_and_none_that_means_another_frame(tmp_path):
+    path = write(tmp_path, WHEELS, FUNNEL, "[initial]\naxis = [0.6, 0.0, 0.8]\nangle_deg = 20.0")
+    text = path.read_text().replace("duration_s = 10.0", "duration_s = 120.0")
+    lines = [PAPER if line.startswith("law = ") else line for line in text.splitlines()]
+    path.write_text("\n".join(lines))
+    flight = casadi_gnc.fly(path)
+    assert flight["funnel_use"].max() < 1
+    assert flight["pointing_error_deg"][-1] < 1
+    path.write_text("\n".join([*lines, '[[reference]]\nkind = "inertial"\nmrp = [0.1, 0.0, 0.0]']))
+    with pytest.raises(ProblemError, match="reads it from the reference; leave out the funnel, or the reference"):
+        casadi_gnc.load(path)
