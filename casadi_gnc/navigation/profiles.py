@@ -10,19 +10,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 
-from casadi_gnc.errors import LawError
+from casadi_gnc.errors import LawError, ProblemError
 from casadi_gnc.mathematics import exact
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.navigation._navigation import Reference, Wanted
 from casadi_gnc.signals import Layout
+from casadi_gnc.system import csv_file
 
 #: Most rows of a table: each costs time in every sample.
 MOST_ROWS = 200
+#: Columns of a file that `Table.read` reads.
+COLUMNS = ["t", "q0", "q1", "q2", "q3"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +146,24 @@ class Table(Reference):
                 rows[i] = [-each for each in row]
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "quaternions", rows)
+
+    @classmethod
+    def read(cls, path: str | Path) -> Table:
+        """Return the table of a CSV file with the columns t, q0, q1, q2, q3: times [s] and quaternions, scalar first.
+
+        Raises
+        ------
+        ProblemError
+            For a file that cannot be read, another line of names, and what is no number, with the line.
+        LawError
+            For what is no table of attitudes.
+        """
+        table = csv_file.read_table(Path(path))
+        if table.names != COLUMNS:
+            told = f"has the columns {', '.join(table.names)}, expected {', '.join(COLUMNS)}"
+            raise ProblemError(told, f"{table.path.name}, line {table.line}")
+        rows = table.column_numbers(COLUMNS)
+        return cls([row[0] for row in rows], [row[1:] for row in rows])
 
     def at(self, t: Any, known: Any) -> Wanted:
         """Return what is wanted at time t [s]."""

@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from casadi_gnc.errors import LawError
+from casadi_gnc.errors import GncError, LawError
 from casadi_gnc.mechanics import earth, quaternions
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.mechanics.orbits import Elements, Orbit
@@ -116,6 +116,21 @@ def test_a_table_is_a_natural_spline():
         assert np.allclose(q, row)
         assert not w.any()
         assert not a.any()
+
+
+def test_a_table_comes_from_a_file(tmp_path):
+    file = tmp_path / "attitudes.csv"
+    lines = [",".join(map(repr, [t, *row])) for t, row in zip(TIMES, ROWS, strict=True)]
+    file.write_text("\n".join(["t, q0, q1, q2, q3", *lines]))
+    assert Table.read(file).quaternions == Table(TIMES, ROWS).quaternions
+    for text, told in (
+        ("t,a,b,c,d\n", "attitudes.csv, line 1: has the columns t, a, b, c, d, expected t, q0, q1, q2, q3"),
+        ("t,q0,q1,q2,q3\n0,1,0,0,x\n", "attitudes.csv, line 2, column q3: 'x' is no number"),
+        ("t,q0,q1,q2,q3\n0,1,0,0,0\n", "1 times and 1 attitudes"),
+    ):
+        file.write_text(text)
+        with pytest.raises(GncError, match=told):
+            Table.read(file)
 
 
 def test_a_timeline_changes_at_its_times():
