@@ -212,7 +212,6 @@ class _Bench:
             lines[-1]["words"], lines[-1]["of"] = lines[-1]["words"] + wrong, lines[-1]["of"] + inputs.size
         if self._about.real == "float64":
             what = f"host with the C library's functions against {self.anew.machine}"
-            what += "" if self.anew.is_exact else ", whose linear solvers compute in another order"
             differences = compare.differences(self._words("other"), self._words("expected"), self.layout)
             lines.append(_comparison(what, differences, exact=self.anew.is_exact))
         else:

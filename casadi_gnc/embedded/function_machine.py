@@ -7,6 +7,8 @@ import numpy as np
 
 from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction
 from casadi_gnc.embedded.parts import Parts
+from casadi_gnc.embedded.programs import expanded
+from casadi_gnc.embedded.programs import is_plain as is_plain_function
 
 _BITS = {name: bit for bit, (name, _) in STATUSES.items()}
 
@@ -16,15 +18,18 @@ class FunctionMachine:
 
     def __init__(self, own: FlightFunction) -> None:
         self._own = own
+        self._parts = Parts()
+        self._parts.function(own.function)
+        # What the C is made of: CasADi's way to scalars simplifies some sums and products, so MX has other last bits.
+        is_plain = is_plain_function(own.function)
+        self._function = expanded(own.function, own.function.name()) if is_plain else own.function
         self._memory = np.array(own.initial)
         self._last = np.zeros(own.outputs.size)
 
     @property
     def is_exact(self) -> bool:
-        """Whether the C computes in the order of this machine."""
-        parts = Parts()
-        parts.function(self._own.function)
-        return parts.is_exact
+        """Whether the C computes in the order of this machine: it is straight-line code, without a call."""
+        return len(self._parts.texts) == 1 and self._function.is_a("SXFunction")
 
     def step(self, row: np.ndarray) -> np.ndarray:
         """Return outputs, state and status of a step."""
@@ -34,7 +39,7 @@ class FunctionMachine:
         return np.concatenate([self._last, self._memory, [status]])
 
     def _advance(self, row: np.ndarray) -> int:
-        own, function = self._own, self._own.function
+        own, function = self._own, self._function
         given = []
         for i, name in enumerate(function.name_in()):
             layout, column = (own.state, self._memory) if name in own.pairs else (own.inputs, row)

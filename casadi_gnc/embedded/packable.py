@@ -116,7 +116,6 @@ class PackableFunction:
 
     own: FlightFunction
     scheme = ""
-    machine = "CasADi's machine"
 
     @property
     def title(self) -> str:
@@ -153,6 +152,11 @@ class PackableFunction:
         return FunctionMachine(self.own).replay(rows)
 
     @property
+    def machine(self) -> str:
+        """What the function is compared with."""
+        return "CasADi's machine" + (", whose order is another" if not self.is_exact else "")
+
+    @property
     def is_exact(self) -> bool:
-        """Whether there is no linear system in it: CasADi's own solvers go another way."""
+        """Whether the C is the function in scalars and nothing else."""
         return FunctionMachine(self.own).is_exact

@@ -39,7 +39,6 @@ class Parts:
     real: Real = "double"
     status: str = "GNC"
     texts: list[str] = field(default_factory=list)
-    is_exact: bool = True  # whether CasADi's machine computes in the same order: no linear system
     _known: dict[str, Callee] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
     _functions: list[tuple[ca.Function, Callee]] = field(default_factory=list)
@@ -214,7 +213,6 @@ class Parts:
         key = f"solve {n} {columns} {transposed} {matrix.row()} {matrix.colind()}"
         if key in self._known:
             return self._known[key]
-        self.is_exact = False
         self._used.add("solve_linear")
         lines = [f"    gnc_real matrix[{n * n}];", f"    gnc_real lu[{n * n}];", f"    int32_t row[{n}];"]
         lines += ["    int32_t i;", f"    for (i = 0; i < {n * n}; ++i) {{"]

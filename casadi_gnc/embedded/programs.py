@@ -41,6 +41,7 @@ _REMEDIES = {
     **dict.fromkeys(("Newton", "FastNewton", "KinsolInterface", "ImplicitToNlp"), _ROOTS),
     **dict.fromkeys(("RungeKutta", "Collocation", "CvodesInterface", "IdasInterface"), _STEPS),
     **dict.fromkeys(("External", "GenericExternal"), _OUTSIDE),
+    "LinearInterpolantJac": "where a slope of a table is needed, make the table a B-spline",
     "CallbackInternal": "Python does not fly; write it in CasADi symbols, or pass what it gives",
 }
 

@@ -129,8 +129,9 @@ def expression(node: Node, flags: list[bool], maths: Math, real: Real) -> str:
         ca.OP_IF_ELSE_ZERO: f"{p} ? {y} : {zero}",
         # The sum of two of the above of which one is zero: + 0 turns -0 into +0 as that sum does.
         _SELECT: f"({p} ? {y} : {(a + [''] * 3)[2]}) + {zero}",
-        ca.OP_FMIN: f"({x} < {y}) ? {x} : {y}",
-        ca.OP_FMAX: f"({x} > {y}) ? {x} : {y}",
+        # Of a number and NaN the number, of two zeros the first, as the C library does.
+        ca.OP_FMIN: f"(({x} <= {y}) || ({y} != {y})) ? {x} : {y}",
+        ca.OP_FMAX: f"(({x} >= {y}) || ({y} != {y})) ? {x} : {y}",
         ca.OP_SIGN: f"({x} < {zero}) ? -{one} : (({x} > {zero}) ? {one} : {x})",
     }
     if code not in shapes:

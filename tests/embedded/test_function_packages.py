@@ -79,7 +79,7 @@ def test_header_and_readme_say_names_shapes_units_and_the_period(package):
 def test_verification_rebuilds_the_saved_function_and_demands_the_shipped_words(package, tmp_path):
     found = gnc.verify(package)
     assert found["is_sound"]
-    assert [one["exact"] for one in found["comparisons"]][-1] is False  # a linear system is solved otherwise
+    assert [one["exact"] for one in found["comparisons"]][-1] is False  # there are calls in it
     copy = Path(shutil.copytree(package, tmp_path / "copy"))
     kept = json.loads((copy / "function.json").read_text())
     (copy / "function.json").write_text(json.dumps({**kept, "initial": [0.5, 0.0]}))

@@ -58,3 +58,36 @@ def same_words(found: np.ndarray, expected: np.ndarray) -> bool:
     """Tell whether numbers have the same bits; NaN is NaN."""
     both = np.isnan(found) & np.isnan(expected)
     return bool(((found.view(np.uint64) == expected.view(np.uint64)) | both).all())
+
+
+def everything() -> ca.Function:
+    """Return a function with a piece of every kind."""
+    x, a, c = ca.MX.sym("x", 3), ca.MX.sym("a", 3, 3), ca.MX.sym("c")
+    even = ca.interpolant("even", "linear", [[0, 1, 2, 3]], [1, 2, 4, -3])
+    uneven = ca.interpolant("uneven", "linear", [[0, 1, 2.5], [0, 1.0, 3]], [1, 2, 4, 3, 3, 3.3, 9, 8, 7.0])
+    smooth = ca.interpolant("smooth", "bspline", [[0, 1, 2, 3, 4, 5], [0, 1, 2, 3.5, 4]], list(np.arange(30.0) ** 1.5))
+    column, u = ca.SX.sym("column", 3), ca.SX.sym("u")
+    step = ca.Function("step", [column, u], [ca.vertcat(column[1], column[2], ca.sin(column[0]) + u)])
+    inner = ca.MX.sym("inner", 3)
+    both = ca.Function("both", [inner], [ca.sumsqr(inner) * uneven(inner[:2]), inner * 2])
+    first, second = both(x * x)
+    third, _ = both(second + first)
+    solved = ca.solve(a, second)
+    return ca.Function(
+        "everything",
+        [x, a, c],
+        [
+            third,
+            smooth(x[:2]),
+            ca.jacobian(smooth(x[:2]), x),
+            step.mapaccum("steps", 20)(x, ca.repmat(c, 1, 20)),
+            step.map(3)(a, ca.horzcat(c, c, 1)),
+            ca.if_else(c > 0, uneven(x[:2]), ca.sqrt(x[1] * x[1]), True),
+            ca.conditional(c, [x[0], x[1]], x[2], True),
+            even(x[2]),
+            ca.norm_2(x) + ca.det(a),
+            solved + x,
+            ca.solve(a.T, solved),
+            ca.inv(a),
+        ],
+    )
