@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 from casadi_gnc.errors import GncError
 from casadi_gnc.laws import REGISTRY as LAWS
@@ -14,6 +14,7 @@ from casadi_gnc.laws import Law, gains_of
 from casadi_gnc.missions import fitting
 from casadi_gnc.missions.craft import REGISTRY as CRAFTS
 from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.parts import Parts
 from casadi_gnc.problem_files.document import Document, read_kind
 from casadi_gnc.problem_files.loading import craft_of, load
 from casadi_gnc.signals import Layout
@@ -25,6 +26,7 @@ class Sample:
     """Hold one craft of a class, for what only an object can say."""
 
     measured: Layout
+    read: Layout  # by laws: the measured signals, or those of a navigation
     effort: Layout
     belief: Any
 
@@ -75,14 +77,18 @@ def sample_of(craft: Named, problem: str | Path | None = None) -> Sample | None:
     try:
         if kind.example is not None:
             mission = load(kind.example, strict=False)
-            return Sample(mission.truth.measurement, mission.schemes[0].actuation.effort, mission.craft.belief())
+            return _sample(mission.parts_asked, mission.schemes[0].actuation.effort)
         if problem is not None and _names(read_kind(problem, "mission"), craft.name):
             mission = load(problem, strict=False)
-            return Sample(mission.truth.measurement, mission.schemes[0].actuation.effort, mission.craft.belief())
+            return _sample(mission.parts_asked, mission.schemes[0].actuation.effort)
         made = kind()
-        return Sample(made.plant().measurement, made.actuation().effort, made.belief())
+        return _sample(Parts(made), made.actuation().effort)
     except GncError:
         return None
+
+
+def _sample(parts: Parts, effort: Layout) -> Sample:
+    return Sample(parts.plant.measurement, parts.readable, effort, parts.belief)
 
 
 def _names(document: Document, craft: str) -> bool:
@@ -93,7 +99,7 @@ def fits(law: Named, sample: Sample | None) -> list[str] | None:
     """Return why a law does not fit a craft, nothing where it does, None where nobody can say."""
     if sample is None:
         return None
-    return list(fitting.misfits(law.kind, sample.measured, sample.belief, sample.effort))
+    return list(fitting.misfits(law.kind, sample.read, sample.belief, sample.effort))
 
 
 def gains(law: type[Law]) -> Iterator[dict[str, Any]]:
@@ -115,13 +121,35 @@ def gains(law: type[Law]) -> Iterator[dict[str, Any]]:
 
 
 def keys(craft: type[Craft]) -> Iterator[dict[str, Any]]:
-    """Yield the keys of [spacecraft], the craft's own tables, and what it adds to a [[scheme]]."""
+    """Yield the keys of [spacecraft], of the craft's own tables, and what it adds to a [[scheme]]."""
     own = own_tables(craft)
     for name, field in craft.model_fields.items():
-        where = f"[{name}]" if name in own else "[spacecraft]"
-        yield _key(where, name, field)
+        if name not in own:
+            yield _key("[spacecraft]", name, field)
+            continue
+        tables = list(_tables(name, field.annotation))
+        if not tables:
+            yield _key(f"[{name}]", name, field)
+        for where, kind in tables:
+            yield from (_key(where, key, inner) for key, inner in kind.model_fields.items() if key != _TAG)
     for name, field in craft.scheme_keys.model_fields.items():
         yield _key("[[scheme]]", name, field)
+
+
+#: The key by which tables of one name are told apart.
+_TAG = "kind"
+
+
+def _tables(name: str, annotation: Any, several: bool = False) -> Iterator[tuple[str, type[Part]]]:
+    """Yield the tables that a field of a craft stands for, and how each is written."""
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        where = f"[[{name}]]" if several else f"[{name}]"
+        tag = annotation.model_fields.get(_TAG)
+        words = get_args(tag.annotation) if tag is not None else ()
+        yield where + (f' {_TAG} = "{words[0]}"' if words else ""), annotation
+        return
+    for inner in get_args(annotation):
+        yield from _tables(name, inner, several or get_origin(annotation) is list)
 
 
 def _key(where: str, name: str, field: Any) -> dict[str, Any]:
