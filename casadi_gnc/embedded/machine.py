@@ -46,7 +46,7 @@ class Machine:
             return np.zeros(0)
         at = [self._age % length for length in monitor.lines]
         past = [line[i] for line, i in zip(self._lines, at, strict=True)]
-        given = {**ports, "age": min(self._age, monitor.horizon), "past": past, "kept": self._kept}
+        given = {**ports, "age": min(self._age, monitor.horizon), "after": 0, "past": past, "kept": self._kept}
         found = monitor.tape.call([ca.DM(given[port]) for port in monitor.tape.name_in()])
         pushed, self._kept, robustness, verdict = (np.array(each).ravel() for each in found)
         for line, i, value in zip(self._lines, at, pushed, strict=True):

@@ -49,10 +49,12 @@ class Monitor:
     ----------
     watched : the requirements, in order.
     left_out : id of each that cannot be watched on board, and why.
-    tape : (t, y, wanted, limited, actuators, report, status, age, past, kept) -> (pushed, later, robustness, verdict).
+    tape : (t, y, wanted, limited, actuators, report, status, age, after, past, kept) -> (pushed, later, robustness,
+        verdict).
     lines : length of each delay line, in samples.
     initial : the registers before the first sample.
     horizon : number of a sample from which on all are alike.
+    finish : steps after the last sample until all is known.
 
     Raises
     ------
@@ -66,6 +68,7 @@ class Monitor:
     lines: tuple[int, ...]
     initial: tuple[float, ...]
     horizon: int
+    finish: int
 
     def __post_init__(self) -> None:
         names = [one.name for one in self.watched]

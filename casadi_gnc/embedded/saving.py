@@ -39,6 +39,7 @@ def to_text(controller: Controller) -> str:
         own = controller.monitor
         kept = {"watched": [asdict(one) for one in own.watched], "tape": own.tape.serialize(), "horizon": own.horizon}
         content["monitor"] = {**kept, "left_out": own.left_out, "lines": own.lines, "initial": own.initial}
+        content["monitor"] |= {"finish": own.finish}
     content["allocation"] = None if controller.allocation is None else _problem(controller.allocation)
     return json.dumps({"format": _FORMAT, "casadi": metadata.version("casadi"), **content}, indent=1) + "\n"
 
@@ -70,6 +71,7 @@ def _monitor_of(content: dict[str, Any]) -> Monitor:
         lines=tuple(int(length) for length in content["lines"]),
         initial=tuple(float(value) for value in content["initial"]),
         horizon=int(content["horizon"]),
+        finish=int(content["finish"]),
     )
 
 

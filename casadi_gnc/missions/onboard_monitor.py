@@ -43,10 +43,11 @@ def monitor_of(mission: Mission, loop: Loop, tunables: ca.SX) -> Monitor | None:
         except RequirementError as error:
             left_out.append((one.id, str(error)))
     if not able:
-        return Monitor((), tuple(left_out), ca.Function("watch", [], []), (), (), 0)
+        return Monitor((), tuple(left_out), ca.Function("watch", [], []), (), (), 0, 0)
     made = monitor_tape(able, layout, period)
     kept = {
         "age": ca.SX.sym("age"),
+        "after": ca.SX.sym("after"),
         "past": ca.SX.sym("past", len(made.lines)),
         "kept": ca.SX.sym("kept", len(made.initial)),
     }
@@ -57,7 +58,7 @@ def monitor_of(mission: Mission, loop: Loop, tunables: ca.SX) -> Monitor | None:
         Watched(one.id, one.asked, unit, delay * period)
         for one, unit, delay in zip(able, made.units, made.delays, strict=True)
     ]
-    return Monitor(tuple(seen), tuple(left_out), tape, made.lines, made.initial, made.horizon)
+    return Monitor(tuple(seen), tuple(left_out), tape, made.lines, made.initial, made.horizon, made.finish)
 
 
 def _on_board(loop: Loop, tunables: ca.SX) -> tuple[Layout, ca.SX, dict[str, ca.SX]]:

@@ -1,4 +1,4 @@
-"""Random formulas on random signals have the robustness of RTAMT's discrete-time semantics."""
+"""Random formulas on random signals: RTAMT's robustness in discrete time, and monitors that agree with the record."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import random
 import numpy as np
 import pytest
 
-from casadi_gnc.missions.requirements import Requirement
+from casadi_gnc.missions.requirements import Monitor, Requirement
+from casadi_gnc.signals import Layout, Signal
 
 NAMES = ("a", "b", "c")
 SAMPLES = 40
@@ -17,8 +18,8 @@ SAMPLES = 40
 class Writer:
     """Write a formula in both languages; of RTAMT's, `held` is `historically` once there are enough samples."""
 
-    def __init__(self, rng):
-        self.rng, self.held = rng, set()
+    def __init__(self, rng, endless=True):
+        self.rng, self.held, self.endless = rng, set(), endless
 
     def interval(self):
         first = self.rng.choice((0, 0, 1, 3))
@@ -48,7 +49,7 @@ class Writer:
         if kind == "until":
             mine, other = self.formula(self.rng.randrange(depth))
             return f"(({ours}) until[{first}, {last}] ({mine}))", f"(({theirs}) until[{first},{last}] ({other}))"
-        if self.rng.random() < 0.2:
+        if self.endless and self.rng.random() < 0.2:
             return f"{kind}({ours})", f"{kind}({theirs})"
         return f"{kind}[{first}, {last}]({ours})", f"{kind}[{first},{last}]({theirs})"
 
@@ -72,6 +73,26 @@ def rtamts(text, held, signals):
     specification.spec = text
     specification.parse()
     return specification.evaluate(data)[0][1]
+
+
+def test_monitors_that_are_told_of_the_end_say_what_the_record_says():
+    """Every formula with bounded inner intervals; so does the monitor's verdict before, where it has one."""
+    rng, row = random.Random(16), Layout((Signal("time", 1, "s"), *map(Signal, NAMES)))
+    decided = 0
+    for number in range(150):
+        ours, _ = Writer(rng, endless=False).whole()
+        numbers, time = np.random.default_rng(number), np.arange(float(SAMPLES))
+        signals = {name: np.cumsum(numbers.normal(size=SAMPLES)) * 0.5 for name in NAMES}
+        requirement = Requirement("R", formula=ours)
+        monitor = Monitor([requirement], row, 1.0)
+        words = [
+            monitor.step(time=t, **{name: signals[name][i] for name in NAMES})["R"].word for i, t in enumerate(time)
+        ]
+        truth, last = requirement.robustness({"time": time, **signals}), monitor.finish()["R"]
+        assert (last.robustness, last.word) == (truth, "met" if truth >= 0 else "not met"), ours
+        assert set(words) <= {"open", last.word}, ours
+        decided += words[-1] != "open"
+    assert 75 < decided <= 150
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """The monitor of a flight package: the words and verdicts of the same formula in Python, and of its record."""
 
+import ctypes
 import math
 import subprocess
 from dataclasses import replace
@@ -9,7 +10,7 @@ import pytest
 
 import casadi_gnc as gnc
 from casadi_gnc.delivery.verifying import verify
-from casadi_gnc.embedded import package
+from casadi_gnc.embedded import host, package
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.targets import units
@@ -113,6 +114,47 @@ def test_a_million_samples_have_the_verdicts_of_python(tmp_path):
         not np.array_equal(monitor.advance(row).T.ravel(), given) for row, given in zip(columns, found, strict=True)
     )
     assert wrong == 0
+
+
+FINISH = """
+#include <string.h>
+#include "replay.h"
+int over(void *state, double *seen);
+int over(void *state, double *seen)
+{
+    replay_state *at = (replay_state *)state;
+    watched_input input;
+    watched_output output;
+    memset(&input, 0, sizeof input);
+    memset(&output, 0, sizeof output);
+    (void)watched_monitor_finish(&at->monitor, &at->step, &input, &output);
+    memcpy(seen, &at->monitor.seen, sizeof at->monitor.seen);
+    return (int)(sizeof at->monitor.seen / sizeof(watched_seen));
+}
+"""
+
+
+def test_the_end_of_a_flight_decides_all_as_the_whole_record_does(tmp_path, monkeypatch):
+    """In C and in Python; intervals reach beyond the end, of which the record says what there is."""
+    files, replay, made = package.flight_files, HostPackage.replay, []
+    monkeypatch.setattr(package, "flight_files", lambda *given: {**files(*given), "test/over.c": FINISH})
+    monkeypatch.setattr(host, "units", lambda folder, name: [*units(folder, name), folder / "test" / "over.c"])
+    monkeypatch.setattr(HostPackage, "replay", lambda self, *given: made.append(self) or replay(self, *given))
+    found, seen = flown(tmp_path, FORMULAS, telemetry(300, 8))
+    monitor = Monitor([Requirement(name, formula=text) for name, text in FORMULAS.items()], SIGNALS, 0.1)
+    for row in np.column_stack([seen[name] for name in monitor.signals]):
+        monitor.advance(row)
+    over = monitor.finish()
+    words = np.zeros(2 * len(FORMULAS))
+    state, target = (ctypes.c_void_p(each.ctypes.data) for each in (made[0]._state, words))
+    assert made[0]._c.over(state, target) == len(FORMULAS)
+    robustness, verdicts = words[::2], words.view(np.uint32)[2::4]
+    assert 0.0 in found[-1, 1::2]  # open before
+    for i, (name, text) in enumerate(FORMULAS.items()):
+        truth = Requirement(name, formula=text).robustness(seen)
+        assert (over[name].robustness, over[name].word) == (truth, "met" if truth >= 0 else "not met"), name
+        assert robustness[i] == (truth if math.isfinite(truth) else math.copysign(1e30, truth)), name
+        assert verdicts[i] == (1 if truth >= 0 else 2), name
 
 
 @pytest.mark.parametrize("real", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
@@ -247,7 +289,12 @@ def test_a_monitor_is_told_what_it_needs():
     with pytest.raises(RequirementError, match="rate has 2 numbers, expected 3"):
         monitor.step(rate=[0, 0])
     assert monitor.step(rate=[0, 0, 2], mrp=[9, 9, 9])["R"].word == "not met"
+    assert monitor.finish()["R"].word == "not met"
+    with pytest.raises(RequirementError, match="the flight is over; `reset` begins anew"):
+        monitor.step(rate=[0, 0, 0])
     monitor.reset()
+    with pytest.raises(RequirementError, match="has seen no sample"):
+        monitor.finish()
     assert monitor.step(rate=[0, 0, 0.5])["R"].robustness == 0.5
     assert math.isinf(
         Monitor([Requirement("R", formula="always[1, 2](time < 0)")], SIGNALS, 0.1).step(time=0)["R"].robustness

@@ -2,6 +2,7 @@
 
 A monitor judges an instant as soon as the intervals that begin there have passed. What it says is what the record up to
 then says of those instants that can be judged, and it says "met" or "not met" once nothing that may come can change it.
+When the flight is over, `finish` judges the instants that are left by what there is, as the whole record is judged.
 """
 
 from __future__ import annotations
@@ -32,13 +33,14 @@ class MonitorTape:
     ----------
     requirements : with formulas, in order.
     layout : the signals that they read.
-    step : (row, age, past, kept) -> (pushed, later, robustness, verdict): the signals, the number of the sample, what
-        the delay lines give back, the registers; what goes into the lines, the registers, and what is known of each
-        requirement.
+    step : (row, age, after, past, kept) -> (pushed, later, robustness, verdict): the signals, the number of the sample,
+        how many steps ago the last sample was (0 up to it), what the delay lines give back, the registers; what goes
+        into the lines, the registers, and what is known of each requirement.
     lines : length of each delay line, in samples.
     initial : the registers before the first sample.
     horizon : number of a sample from which on all are alike.
     delays : samples after which an instant can be judged, of each requirement.
+    finish : steps after the last sample until all is known.
     units : of each robustness.
     """
 
@@ -49,6 +51,7 @@ class MonitorTape:
     initial: tuple[float, ...]
     horizon: int
     delays: tuple[int, ...]
+    finish: int
     units: tuple[str, ...]
 
 
@@ -67,7 +70,7 @@ def monitor_tape(requirements: Sequence[Requirement], signals: Layout, period: f
         For a bound on a metric, a signal that is not there, and what no bounded memory can judge: an interval up to the
         end inside another condition over time, intervals that are too long.
     """
-    column, age = signals.symbol("row"), ca.SX.sym("age")
+    column, age, after = signals.symbol("row"), ca.SX.sym("age"), ca.SX.sym("after")
     bounds, woven = [], []
     for one in requirements:
         if not one.formula:
@@ -75,7 +78,7 @@ def monitor_tape(requirements: Sequence[Requirement], signals: Layout, period: f
                 f"{one.id} bounds a metric, which is known when the flight is over; a monitor takes formulas"
             )
         bounds.append(one.bind(signals, column, period))
-        woven.append(_woven(one, bounds[-1], age, period))
+        woven.append(_woven(one, bounds[-1], age, after, period))
     names = frozenset().union(*(bound.names for bound in bounds))
     layout = Layout(tuple(signal for signal in signals.signals if signal.name in names))
     read = ca.vertcat(*(column[signals.place(name)] for name in layout.names))
@@ -90,6 +93,7 @@ def monitor_tape(requirements: Sequence[Requirement], signals: Layout, period: f
     ports = {
         "row": read,
         "age": age,
+        "after": after,
         "past": ca.vertcat(*(line.past for line in lines)) if lines else ca.SX(0, 1),
         "kept": ca.vertcat(*(register.now for register in registers)),
     }
@@ -102,13 +106,14 @@ def monitor_tape(requirements: Sequence[Requirement], signals: Layout, period: f
         initial=tuple(register.initial for register in registers),
         horizon=max((one.horizon for one in woven), default=0),
         delays=tuple(one.delay for one in woven),
+        finish=max((one.finish for one in woven), default=0),
         units=tuple(bound.unit for bound in bounds),
     )
 
 
-def _woven(requirement: Requirement, bound: Any, age: ca.SX, period: float) -> Woven:
+def _woven(requirement: Requirement, bound: Any, age: ca.SX, after: ca.SX, period: float) -> Woven:
     try:
-        woven = weave(bound, age)
+        woven = weave(bound, age, after)
     except RequirementError as error:
         raise RequirementError(f"{requirement.id}: {error}", error.key) from None
     if woven.kept > MOST_KEPT:
@@ -174,8 +179,8 @@ class Monitor:
 
     def reset(self) -> None:
         """Forget everything, as before the first sample."""
-        self._age = 0
-        self._in[3][:] = self._tape.initial
+        self._age, self._finished = 0, False
+        self._in[4][:] = self._tape.initial
         self._line, self._at = np.zeros(self._lengths.sum()), np.zeros(len(self._lengths), dtype=int)
 
     @property
@@ -195,6 +200,8 @@ class Monitor:
         RequirementError
             For a signal that is missing or of another size.
         """
+        if self._finished:
+            raise RequirementError("the monitor was told that the flight is over; `reset` begins anew")
         row = []
         for signal in self._tape.layout.signals:
             if signal.name not in signals:
@@ -203,17 +210,40 @@ class Monitor:
             if numbers.size != signal.size:
                 raise RequirementError(f"{signal.name} has {numbers.size} numbers, expected {signal.size}")
             row.extend(numbers)
-        robustness, verdicts = self.advance(np.array(row))
+        return self._seen(self.advance(np.array(row)))
+
+    def finish(self) -> dict[str, Seen]:
+        """Return what is known of each requirement when the flight is over: met or not met, as of the whole record.
+
+        Raises
+        ------
+        RequirementError
+            Before the first sample.
+        """
+        if not self._age:
+            raise RequirementError("the monitor has seen no sample; `step` gives it one")
+        found, last = np.zeros((2, len(self._tape.requirements))), self._in[0].copy()
+        for after in range(1, self._tape.finish + 1):
+            found = self.advance(last, after)
+        self._finished = True
+        return self._seen(found)
+
+    def _seen(self, found: np.ndarray) -> dict[str, Seen]:
+        robustness, verdicts = found
         return {
             one.id: Seen(WORDS[int(verdict)], unbounded(value))
             for one, value, verdict in zip(self._tape.requirements, robustness, verdicts, strict=True)
         }
 
-    def advance(self, row: np.ndarray) -> np.ndarray:
-        """Take the next sample of the signals that are read, in order; return robustness and verdict, (2, R)."""
-        (given, age, past, kept), (pushed, later, *found) = self._in, self._out
+    def advance(self, row: np.ndarray, after: int = 0) -> np.ndarray:
+        """Take the next sample of the signals that are read, in order; return robustness and verdict, (2, R).
+
+        `after` is the number of a step after the last sample, whose row does not matter.
+        """
+        (given, age, past_end, past, kept), (pushed, later, *found) = self._in, self._out
         places = self._firsts + self._at
         given[:], age[:], past[:] = row, min(self._age, self._tape.horizon), self._line[places]
+        past_end[:] = after
         self._run()
         kept[:], self._line[places] = later, pushed
         self._at = (self._at + 1) % self._lengths

@@ -8,6 +8,9 @@ A condition over an interval ahead is known when the interval has passed: every 
 which its value at an instant is known. Least and largest over a window of w samples come of those over 1, 2, 4, ...
 samples: a comparison for each, and w - 1 numbers kept in all. The formula itself is asked at the first sample alone, so
 its outermost intervals need registers only, however long they are.
+
+At the end of a flight some instants are not known yet: their intervals reach beyond it. Steps after the last sample
+make them known by what there is: an instant beyond the end adds nothing to the least or the largest.
 """
 
 from __future__ import annotations
@@ -65,18 +68,24 @@ class Woven:
     horizon: int
 
     @property
+    def finish(self) -> int:
+        """Steps after the last sample until all is known."""
+        return max(self.delay, 1)
+
+    @property
     def kept(self) -> int:
         """How many numbers the delay lines hold."""
         return sum(line.samples for line in self.lines)
 
 
-def weave(bound: Bound, age: Any) -> Woven:
+def weave(bound: Bound, age: Any, after: Any = None) -> Woven:
     """Return a formula sample by sample.
 
     Parameters
     ----------
     bound : on symbols of one sample.
     age : symbol of the sample's number, from 0.
+    after : symbol of how many steps ago the last sample was, 0 up to it; None where nothing comes after it.
 
     Raises
     ------
@@ -84,9 +93,11 @@ def weave(bound: Bound, age: Any) -> Woven:
         For an interval up to the end of the flight inside another condition over time: what it says of an instant is
         known at the end alone.
     """
-    weaver = _Weaver(bound.margins, age)
+    weaver = _Weaver(bound.margins, age, after)
     value, least, most = weaver.root(bound.tree)
     verdict = ca.if_else(least >= 0, MET, ca.if_else(most < 0, NOT_MET, OPEN))
+    if after is not None:
+        verdict = ca.if_else(after >= max(weaver.delay, 1), ca.if_else(value >= 0, MET, NOT_MET), verdict)
     lines, registers = tuple(weaver.lines), tuple(weaver.registers)
     return Woven(lines, registers, value, verdict, weaver.delay, weaver.horizon + weaver.delay + 1)
 
@@ -96,8 +107,8 @@ def _picked(every: bool) -> Callable[[Any, Any], Any]:
 
 
 class _Weaver:
-    def __init__(self, margins: tuple[ca.SX, ...], age: Any) -> None:
-        self._margins, self._age = margins, age
+    def __init__(self, margins: tuple[ca.SX, ...], age: Any, after: Any) -> None:
+        self._margins, self._age, self._after = margins, age, after
         self.lines: list[Line] = []
         self.registers: list[Register] = []
         self.delay = self.horizon = 0
@@ -133,14 +144,20 @@ class _Weaver:
             )
         if isinstance(node, Window):
             value, delay = self._stream(node.part)
+            value = self._there(value, delay, BEYOND if node.every else -BEYOND)
             return self._window(value, node.last - node.first + 1, node.every), delay + node.last
         (keep, goal), delay = self._aligned([self._stream(node.keep), self._stream(node.goal)])
+        goal = self._there(goal, delay, BEYOND if node.every else -BEYOND)
         width = node.last - node.first + 1
         found = self._reached(keep, goal, width, node.every)
         if node.first:
             before = self._past(self._window(keep, node.first, not node.every), width)
             found = _picked(not node.every)(before, found)
         return found, delay + node.last
+
+    def _there(self, value: ca.SX, delay: int, otherwise: float) -> ca.SX:
+        """Return a value that is known with a delay, and what stands in its place where its instant is past the end."""
+        return value if self._after is None else ca.if_else(self._after > delay, otherwise, value)
 
     def _aligned(self, parts: list[tuple[ca.SX, int]]) -> tuple[list[ca.SX], int]:
         """Return the values of parts at one instant, and the delay of the slowest."""
@@ -191,7 +208,7 @@ class _Weaver:
             node = Window(True, 0, 0, node)
         value, delay = self._stream(node.part)
         so_far = self._register(BEYOND if node.every else -BEYOND)
-        later = ca.if_else(self._within(delay, node.first, node.last), _picked(node.every)(value, so_far), so_far)
+        later = ca.if_else(self._counts(delay, node.first, node.last), _picked(node.every)(value, so_far), so_far)
         self.registers[-1] = Register(so_far, later, self.registers[-1].initial)
         done = self._done(delay, node.last)
         if node.every:
@@ -204,8 +221,8 @@ class _Weaver:
         both, either = _picked(not node.every), _picked(node.every)
         worst, best = (BEYOND, -BEYOND) if node.every else (-BEYOND, BEYOND)
         reached, stays = self._register(worst), self._register(best)
-        later = ca.if_else(self._within(delay, node.first, node.last), either(reached, both(goal, stays)), reached)
-        kept = ca.if_else(self._within(delay, 0, node.last), both(stays, keep), stays)
+        later = ca.if_else(self._counts(delay, node.first, node.last), either(reached, both(goal, stays)), reached)
+        kept = ca.if_else(self._counts(delay, 0, node.last), both(stays, keep), stays)
         self.registers[-2:] = [Register(reached, later, worst), Register(stays, kept, best)]
         can_become = ca.if_else(self._done(delay, node.last), later, either(later, kept))
         return (later, can_become, later) if node.every else (later, later, can_become)
@@ -226,6 +243,11 @@ class _Weaver:
             return since
         self.horizon = max(self.horizon, delay + last)
         return ca.logic_and(since, self._age <= delay + last)
+
+    def _counts(self, delay: int, first: int, last: int | None) -> Any:
+        """Return whether the instant that is known now lies in an interval and not past the end."""
+        within = self._within(delay, first, last)
+        return within if self._after is None else ca.logic_and(within, self._after <= delay)
 
     def _done(self, delay: int, last: int | None) -> Any:
         return ca.SX(0) if last is None else self._since(delay, last)
