@@ -17,6 +17,8 @@ from casadi_gnc.embedded.machine import Machine
 from casadi_gnc.errors import FlightError, NoCompilerError
 from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.missions.onboard import describe
+from casadi_gnc.missions.requirements.monitor import WORDS, Seen
+from casadi_gnc.missions.requirements.requirement import unbounded
 from casadi_gnc.status import StepStatus
 from casadi_gnc.system.folders import workshop
 
@@ -39,7 +41,7 @@ class Stepper:
     """
 
     def __init__(self, mission: Mission, scheme: str | None = None) -> None:
-        self._controller = describe(mission, scheme)
+        self._controller = describe(mission, scheme, monitored=True)
         self._run, self.compiled = _runner(self._controller)
         self.reset()
 
@@ -47,6 +49,7 @@ class Stepper:
         """Forget everything, as before the first sample."""
         self._run.reset()
         self._last = -np.inf
+        self._watched = np.zeros(0)
 
     @property
     def period(self) -> float:
@@ -57,6 +60,20 @@ class Stepper:
     def measurements(self) -> tuple[str, ...]:
         """Names of what `step` is given."""
         return self._controller.measured.names
+
+    @property
+    def seen(self) -> dict[str, Seen]:
+        """What the monitor knows of each requirement after the last step, by id; nothing before the first.
+
+        Of formulas that can be watched on board; it is the package's monitor that watches.
+        """
+        monitor, found = self._controller.monitor, self._watched.reshape(-1, 2)
+        if monitor is None or not len(found):
+            return {}
+        return {
+            one.id: Seen(WORDS[int(verdict)], unbounded(robustness))
+            for one, (robustness, verdict) in zip(monitor.watched, found, strict=True)
+        }
 
     def step(self, t: float, **measurements: Any) -> dict[str, Any]:
         """Return actuators and efforts of one sample, by signal, and its `status` (a `StepStatus`).
@@ -85,6 +102,7 @@ class Stepper:
             raise FlightError(f"the time {t:g} s is not after the last one, {self._last:g} s; `reset` begins anew")
         self._last = t
         numbers = self._run.step(np.array(row))
+        self._watched = numbers[self._controller.outputs.size : -1]
         outputs = {
             name: float(value[0]) if len(value) == 1 else value
             for name, value in ((n, numbers[self._controller.outputs.place(n)]) for n in self._controller.outputs.names)
@@ -103,7 +121,7 @@ class _Compiled:
 
     def __init__(self, controller: Controller) -> None:
         options = Options("stepper")
-        self._outputs = controller.outputs.size + 1
+        self._outputs = controller.replayed.size + 1
         with workshop() as folder:
             files = package.flight_files(controller, options)
             package.put(folder, {**files, "test/replay.h": package.replay_header(controller, options, 1)})

@@ -225,15 +225,20 @@ def test_requirements_that_no_package_watches_leave_it_as_it_was(tmp_path):
     assert not any("monitor" in name for name in files[0])
 
 
-def test_units_and_steppers_have_no_monitor():
-    made = mission({"R": "always(norm(rate) <= 1)"})
-    assert describe(made, "observer_pinv").monitor is None
-    assert set(made.controller("observer_pinv").step(0.0, mrp=[0.1, 0, 0], rate=[0, 0, 0])) == {
-        "force",
-        "wanted",
-        "limited",
-        "status",
-    }
+def test_a_stepper_tells_what_its_monitor_knows():
+    made = mission(
+        {"R": "always(norm(rate) <= 1)", "LATE": "always(norm(rate) > 0.5 implies eventually[0.2](norm(rate) <= 0.5))"}
+    )
+    stepper = made.controller("observer_pinv")
+    assert stepper.seen == {}
+    rates, monitor = (0.1, 0.7, 0.6, 0.4, 0.3, 2.0), Monitor(made.requirements, SIGNALS, 0.1)
+    for k, rate in enumerate(rates):
+        given = {"mrp": [0.1, 0, 0], "rate": [rate, 0, 0]}
+        assert set(stepper.step(0.1 * k, **given)) == {"force", "wanted", "limited", "status"}
+        assert stepper.seen == monitor.step(time=0.1 * k, **given)
+    assert stepper.seen["R"].word == "not met"
+    stepper.reset()
+    assert stepper.seen == {}
 
 
 def test_what_the_law_shows_is_watched_where_time_and_measurement_say_it():
