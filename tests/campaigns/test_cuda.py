@@ -28,12 +28,12 @@ from casadi_gnc.system.cuda_driver import OutOfMemoryError
 #: Missions of every craft, mode and kind of allocation, with what NVRTC may make of them at most: bytes of a thread's
 #: own memory, and of code. Beyond 170 kB of code an H100 waits for instructions, not for numbers.
 FLOWN = {
-    "huang2020/detumble": ("observer_pinv", 512, 60_000),
-    "huang2020/slew": ("funnel_robust", 14_000, 400_000),
-    "huang2019/wheel_faults": ("observers_pinv", 4_000, 170_000),
-    "shi2020/docking": ("iobc", 3_000, 200_000),
-    "sun2018/circular_orbit": ("tracking", 2_000, 230_000),
-    "tao2019/case1": ("funnels", 4_000, 300_000),
+    "huang2020/detumble": ("observer_pinv", 300, 48_000),
+    "huang2020/slew": ("funnel_robust", 13_000, 350_000),
+    "huang2019/wheel_faults": ("observers_pinv", 1_100, 105_000),
+    "shi2020/docking": ("iobc", 600, 140_000),
+    "sun2018/circular_orbit": ("tracking", 1_400, 150_000),
+    "tao2019/case1": ("funnels", 2_800, 190_000),
 }
 
 
