@@ -49,11 +49,27 @@ class Arrow:
     ----------
     signal, label : its name, and what the reader is told.
     frame : in which it is resolved.
+    reversed : draw it the other way: a position from the Earth's centre, reversed, points down.
     """
 
     signal: str
     label: str
     frame: Literal["body", "reference"] = "body"
+    reversed: bool = False
+
+
+@dataclass(frozen=True)
+class Direction:
+    """Draw a direction that stays during a flight, such as that of the sun.
+
+    Parameters
+    ----------
+    label : what the reader is told.
+    vector : (3,), unit vector, reference frame.
+    """
+
+    label: str
+    vector: Sequence[float]
 
 
 @dataclass(frozen=True)
@@ -71,6 +87,7 @@ class Scene:
     size, centre : (3,), [m], of the box that stands for the craft, in the frame of `turned`.
     turned : rows of the rotation from that frame to the body frame, (3, 3).
     jets, spinners, arrows : what pushes, spins and points.
+    directions : that stay, reference frame.
     """
 
     attitude: str = ""
@@ -86,6 +103,7 @@ class Scene:
     jets: Jets | None = None
     spinners: Spinners | None = None
     arrows: Sequence[Arrow] = ()
+    directions: Sequence[Direction] = ()
 
     @classmethod
     def of(cls, state: Layout) -> Scene:

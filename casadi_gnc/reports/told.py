@@ -65,6 +65,14 @@ class ShownArrow(Told):
     signal: str
     label: str
     frame: Literal["body", "reference"]
+    reversed: bool = False
+
+
+class ShownDirection(Told):
+    """`casadi_gnc.missions.scene.Direction`."""
+
+    label: str
+    vector: Three
 
 
 class ShownScene(Told):
@@ -83,6 +91,7 @@ class ShownScene(Told):
     jets: ShownJets | None
     spinners: ShownSpinners | None
     arrows: list[ShownArrow]
+    directions: list[ShownDirection] = []
 
 
 class ShownScheme(Told):

@@ -195,12 +195,11 @@ def test_hostile_titles_show_as_text(browser, detumble, tmp_path, title):
     scheme = mission.with_scheme("observer_robust", title=title)
     flight = replace(casadi_gnc.fly(scheme), notes=(title,))
     page = flight_page.of_mission(scheme, [flight], tmp_path / "a.html")
-    for width in (1280, 400):
-        with opened(browser, page, width=width) as sheet:
-            assert sheet.locator("h1").text_content() == visible(title)
-            assert visible(title) in sheet.locator("#verdict").text_content()
-            assert sheet.evaluate("document.documentElement.scrollWidth") <= width
-            assert sheet.evaluate("document.querySelectorAll('main img, main script').length") == 0
+    with opened(browser, page, width=400) as sheet:
+        assert sheet.locator("h1").text_content() == visible(title)
+        assert visible(title) in sheet.locator("#verdict").text_content()
+        assert sheet.evaluate("document.documentElement.scrollWidth") <= 400
+        assert sheet.evaluate("document.querySelectorAll('main img, main script').length") == 0
 
 
 def test_without_webgl_a_still_picture(browser, page):
@@ -241,7 +240,7 @@ def test_half_a_folder_is_shown_quietly(browser, flown, tmp_path):
         legible(sheet, 1280)
 
 
-@pytest.mark.parametrize("name", ["huang2019/nominal", "sun2018/circular_orbit", "shi2020/docking", "huang2020/slew"])
+@pytest.mark.parametrize("name", ["satellites/earth_pointing", "sun2018/circular_orbit"])
 def test_other_craft(browser, name, tmp_path):
     mission = casadi_gnc.load(name).with_timing(duration=60.0)
     flight = casadi_gnc.fly(mission)
@@ -249,7 +248,9 @@ def test_other_craft(browser, name, tmp_path):
     with opened(browser, page) as sheet:
         sheet.evaluate("report.moment(report.nearest(20))")
         keep(sheet, f"flight-{name.replace('/', '-')}")
-        if name == "sun2018/circular_orbit":
+        if name == "satellites/earth_pointing":
+            assert {"down", "sun", "rate"} <= set(sheet.locator("#view .name").all_inner_texts())
+        else:
             # In the target's frame, from the record: r_e of the chaser's frame turned back, and the point held.
             time = float(sheet.locator("#clock").inner_text().removesuffix(" s"))
             k = round(time / mission.timing.sample_period)

@@ -201,7 +201,10 @@ def test_what_is_no_flight_is_told(tmp_path):
     assert not (tmp_path / "a.html").exists()
 
 
-@pytest.mark.parametrize("name", ["huang2019/nominal", "sun2018/circular_orbit", "shi2020/docking", "tao2019/case1"])
+@pytest.mark.parametrize(
+    "name",
+    ["huang2019/nominal", "sun2018/circular_orbit", "shi2020/docking", "tao2019/case1", "satellites/thruster_hold"],
+)
 def test_every_craft_is_drawn_whole(name, tmp_path):
     """All that its pictures and its scene name is recorded."""
     mission = casadi_gnc.load(name).with_timing(duration=10.0)

@@ -29,6 +29,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import Craft, EffortKeys
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.scene import Arrow, Direction, Jets, Scene, Spinners
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
 from casadi_gnc.signals import Layout
@@ -282,6 +283,31 @@ class SatelliteCraft(Craft):
         if self.wheel:
             shown.append(Panel("lines", "wheel_speed", "wheel speed"))
         return tuple(shown)
+
+    def _jets(self) -> Jets:
+        """Return the thrusters about the centre of mass at rest."""
+        centre = np.array(ca.DM(self._at_rest()[1])).ravel()
+        return Jets(
+            "force",
+            [(np.array(each.position_m) - centre).tolist() for each in self.thruster],
+            [each.direction for each in self.thruster],
+            [each.max_force_N for each in self.thruster],
+        )
+
+    def scene(self, mission: Mission) -> Scene:
+        """Return the body with its wheels and thrusters, the way down and the way to the sun."""
+        inputs, sun = mission.truth.inputs, self._sun()
+        away = np.abs([each.position_m for each in self.thruster]).max(axis=0) if self.thruster else np.full(3, 0.5)
+        down = [] if self.orbit is None else [Arrow("position", "down", "reference", reversed=True)]
+        return Scene(
+            attitude="mrp",
+            reference="inertial frame",
+            size=[float(value) for value in np.maximum(2 * away, 0.3 * away.max())],
+            jets=self._jets() if "force" in inputs else None,
+            spinners=Spinners("wheel_speed", [each.axis for each in self.wheel]) if self.wheel else None,
+            arrows=[Arrow("rate", "rate"), *down],
+            directions=[] if sun is None else [Direction("sun", np.array(ca.DM(sun(0.0))).ravel().tolist())],
+        )
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
         """Yield what can be said of a satellite before it flies."""

@@ -161,6 +161,16 @@ const space = (() => {
       return { ...one, arrow, name: names[names.length - 1], most: largest(one.a, count) };
     });
 
+    // Directions that stay.
+    const outside = told.directions.map((one) => {
+      const direction = vector(one.vector).normalize();
+      const line = rod(new THREE.Color(record.colour("c4")), 1.9, 0.02);
+      point(line, direction);
+      scene.add(line);
+      label(one.label, scene, direction.clone().multiplyScalar(2.05)).style.color = record.colour("c4");
+      return { line, direction, name: names[names.length - 1] };
+    });
+
     // The funnel of the attitude: within it the body's x axis stays in a cone about the reference's.
     let cone = null;
     if (told.cone) {
@@ -196,7 +206,7 @@ const space = (() => {
     }
 
     home.append(renderer.domElement);
-    return { home, told, scheme, renderer, scene, camera, craft, body, plumes, wheels, arrows, cone, passed, scale, names, look: { around: 0.7, above: 0.45, away: 8.2 }, moment: 0, dirty: true };
+    return { home, told, scheme, renderer, scene, camera, craft, body, plumes, wheels, arrows, outside, cone, passed, scale, names, look: { around: 0.7, above: 0.45, away: 8.2 }, moment: 0, dirty: true };
   }
 
   // Where the craft is, reference frame, [m].
@@ -207,7 +217,7 @@ const space = (() => {
   }
 
   function pose() {
-    const { told, craft, plumes, wheels, arrows, cone, passed, scale, moment } = view;
+    const { told, craft, plumes, wheels, arrows, outside, cone, passed, scale, moment } = view;
     if (told.attitude) craft.quaternion.copy(turn(at(told.attitude, moment)));
     if (told.position) {
       craft.position.copy(position(told, moment).multiplyScalar(scale));
@@ -233,12 +243,16 @@ const space = (() => {
       const size = norm(values);
       const length = one.most > 0 ? (1.9 * size) / one.most : 0;
       one.arrow.userData.stretch(length);
-      const direction = size > 0 ? vector(values).divideScalar(size) : UP();
+      const direction = size > 0 ? vector(values).divideScalar(one.reversed ? -size : size) : UP();
       point(one.arrow, direction);
       if (one.frame === "reference") one.arrow.position.copy(craft.position);
       one.name.offset.copy(direction).multiplyScalar(length + 0.15);
       if (one.frame === "reference") one.name.offset.add(craft.position);
       one.name.hidden = length < 0.08;
+    }
+    for (const one of outside) {
+      one.line.position.copy(craft.position);
+      one.name.offset.copy(one.direction).multiplyScalar(2.05).add(craft.position);
     }
     if (cone) {
       const [lower, upper] = told.cone.map((wall) => at(wall, moment));
