@@ -99,7 +99,7 @@ def choose(
     try:
         card = present()
     except GpuError as error:
-        return Choice(c, f"engine c: {told}; no GPU: {str(error).partition(';')[0]}")
+        return Choice(c, f"engine c: {told}; without a GPU: {str(error).partition(';')[0]}")
     on_gpu = seconds_on_gpu(program, flights)
     told = f"{told}, {card} about {_rounded(on_gpu)}"
     return Choice(cuda, f"engine cuda: {told}") if on_gpu < on_cores else Choice(c, f"engine c: {told}")

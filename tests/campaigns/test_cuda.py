@@ -265,7 +265,7 @@ def test_auto_takes_what_is_done_first_and_says_why(monkeypatch):
     lacking = GpuError("no NVIDIA driver is installed")
     monkeypatch.setattr(cuda, "present", lambda: (_ for _ in ()).throw(lacking))
     assert choose("auto", made, 10**5, threads=2).why.startswith("engine c: 2 cores take about ")
-    assert choose("auto", made, 10**5, threads=2).why.endswith("; no GPU: no NVIDIA driver is installed")
+    assert choose("auto", made, 10**5, threads=2).why.endswith("; without a GPU: no NVIDIA driver is installed")
     assert "GPU" not in choose("auto", made, 1, threads=2).why  # all is done before it begins
     monkeypatch.setattr(cuda, "present", lambda: "NVIDIA H100")
     assert choose("auto", made, 10**5, threads=2).why.startswith("engine cuda: 2 cores take about ")
