@@ -19,6 +19,7 @@ from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.one_build import OneBuild, fly_case
 from casadi_gnc.missions.scheme import Metric
+from casadi_gnc.status import StepStatus
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,9 +159,10 @@ class Campaign:
         return self.case(f"worst:{metric}")
 
     def case(self, told: int | str) -> Case:
-        """Return a case by its number, as "worst:METRIC", "best:METRIC", "median:METRIC", or "failed:REQUIREMENT".
+        """Return a case by its number, or as "worst:METRIC", "best:METRIC", "median:METRIC", "failed:REQUIREMENT".
 
-        The last is the case that is farthest from meeting the requirement.
+        The last is the case that is farthest from meeting the requirement; "failed:1" the first that fails any, or
+        diverged, "failed:2" the second.
         """
         number = self._number(str(told))
         place = np.flatnonzero(self.column("case") == number)
@@ -173,17 +175,30 @@ class Campaign:
         if told.isdecimal():
             return int(told)
         how, _, metric = told.partition(":")
+        if how == "failed" and metric.isdecimal():
+            return self._failing(int(metric))
         if how == "failed" and metric:
             return self._farthest(metric)
         if how not in ("worst", "best", "median") or not metric:
             raise CampaignError(
-                f"no case {told!r}; expected its number, worst:METRIC, best:METRIC, median:METRIC or failed:REQUIREMENT"
+                f"no case {told!r}; expected its number, worst:METRIC, best:METRIC, median:METRIC, failed:REQUIREMENT "
+                "or failed:1"
             )
         ranked = self.ranked(metric)
         if not len(ranked):
             raise CampaignError("no case flew: all are refused")
         place = {"worst": 0, "best": len(ranked) - 1, "median": len(ranked) // 2}[how]
         return int(ranked[place])
+
+    def _failing(self, place: int) -> int:
+        """Return the case that is the `place`-th of those that diverged or fail a requirement, by their numbers."""
+        bad = self.column(f"samples.{StepStatus.DIVERGED.name}") > 0
+        for one in self.cases.varied.nominal.requirements:
+            bad |= self.column(f"requirement.{one.id}") < 0
+        numbers = self.column("case")[bad & self.flew]
+        if not 1 <= place <= len(numbers):
+            raise CampaignError(f"no case failed:{place}; {len(numbers)} flights fail a requirement or diverged")
+        return int(numbers[place - 1])
 
     def _farthest(self, requirement: str) -> int:
         known = [one.id for one in self.cases.varied.nominal.requirements]

@@ -44,7 +44,8 @@ def fly(
     mode: Annotated[ModeChoice | None, typer.Option(help="Instead of the file's own mode.")] = None,
     decimation: Annotated[int | None, typer.Option(min=1, help="Keep every so many-th sample.")] = None,
     case: Annotated[
-        str | None, typer.Option(help="Of a campaign's folder: a number, worst:METRIC, median:METRIC, failed:ID.")
+        str | None,
+        typer.Option(help="Of a campaign's folder: a number, worst:METRIC, median:METRIC, failed:ID, failed:1."),
     ] = None,
     plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,

@@ -57,6 +57,16 @@ def test_requirements_that_look_ahead_inside_others_are_judged_from_whole_record
     assert told["R-3"]["verdict"] == ("undecided" if (found.column("requirement.R-3") >= 0).all() else "not met")
 
 
+def test_cases_that_fail_are_found_by_their_order(found):
+    bad = np.zeros(120, dtype=bool)
+    for i in (1, 2, 3):
+        bad |= found.column(f"requirement.R-{i}") < 0
+    numbers = np.flatnonzero(bad)
+    assert [found.case(f"failed:{k}").number for k in (1, 2, len(numbers))] == [numbers[0], numbers[1], numbers[-1]]
+    with pytest.raises(CampaignError, match=f"no case failed:{len(numbers) + 1}; {len(numbers)} flights fail"):
+        found.case(f"failed:{len(numbers) + 1}")
+
+
 def test_records_are_kept_of_the_worst_the_failed_and_some_at_random(found, folder):
     told = json.loads((folder / "kept" / "kept.json").read_text())
     assert told["keep"] == {"worst": 3, "failed": 4, "random": 2}
