@@ -26,7 +26,7 @@ _PER_GPU_ITERATING = 0.15e12
 #: Flights that fill it.
 _FILLS_GPU = 34_000
 #: Seconds of the compiler for each operation: gcc for lanes; NVRTC, and with the on-board solver in all.
-_BUILD, _BUILD_GPU, _BUILD_GPU_ITERATING = 0.8e-3, 0.5e-3, 25.0
+_BUILD, _BUILD_GPU, _BUILD_GPU_ITERATING = 0.3e-3, 0.2e-3, 5.0
 #: Seconds on cores below which no GPU is asked.
 _SOON = 5.0
 
