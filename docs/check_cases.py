@@ -20,6 +20,10 @@ def shown(shows: dict) -> str:
     """Return what tells a bad flight from a good one."""
     if "status" in shows:
         return f"`{shows['status']}`"
+    if "metric" in shows:
+        return f"no `{shows['metric']}`"
+    if "at_least" in shows:
+        return f"`{shows['signal']}` below {shows['at_least']:g}"
     return f"`{shows['signal']}` above {shows['at_most']:g} after {shows['after_s']:g} s"
 
 

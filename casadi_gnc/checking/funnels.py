@@ -11,23 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
 from scipy import sparse
 from scipy.optimize import linprog
 
-from casadi_gnc.checking import programs
+from casadi_gnc.checking import flown, programs
 from casadi_gnc.checking.authority import believed
-from casadi_gnc.checking.linear import loop_at, target_state
+from casadi_gnc.checking.linear import driven_at_the_end, target_state
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Funnel, Scheme
 
 #: Intervals of the grid, over the time in which the funnel comes within 1 % of its floor.
 _GRID = 80
-#: Steps with which a continuous loop is followed at most; exact for a load that is held over each.
-_SAMPLES = 4_000
 #: Share of a funnel that is as good as infinite.
 _BEYOND = 1e12
 #: Share above which the grid of times and the one G leave no doubt.
@@ -63,6 +62,8 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
                 "Widen the floor, sample faster, or let the observer estimate the disturbance sooner.",
                 "linearised loop at the end of the flight under the plant's own disturbance, last half of the flight",
             )
+            if scheme.law.keeps(funnel.signal) and flown.can_fly(mission, scheme):
+                yield _flown(mission, scheme, funnel)
         if _is_attitude(mission, funnel):
             yield from attitude_range(mission, funnel)
 
@@ -100,14 +101,32 @@ def attitude_range(mission: Mission, funnel: Funnel) -> Iterator[Check]:
     )
 
 
+def _flown(mission: Mission, scheme: Scheme, funnel: Funnel) -> Check:
+    """Return the largest share of a funnel in the flight without noise, through the scheme's own allocation."""
+    times, states = flown.path(mission, scheme)
+    t, signal = ca.SX.sym("t"), states[:, mission.truth.state.place(funnel.signal)]
+    walls: Any = ca.Function("walls", [t], list(funnel.bounds.walls(t))).map(len(times))(times[None, :])
+    lower, upper = (np.array(wall).T for wall in walls)
+    use = np.maximum(signal / upper, signal / lower).max(axis=1)
+    left = ~(use <= 1)
+    when = f"leaves its funnel at {times[left.argmax()]:g} s" if left.any() else "leaves its funnel"
+    return Check(
+        f"funnel.flown.{funnel.signal}",
+        float(np.where(use < _BEYOND, use, np.inf).max()),
+        1.0,
+        "-",
+        "fail",
+        f"Through this allocation the signal {when}, without noise already.",
+        "Take an allocation that makes what the law asks, feed back what was made, or widen the funnel there.",
+        "the flight itself, without noise",
+    )
+
+
 def floor_use(mission: Mission, scheme: Scheme, funnel: Funnel) -> float:
     """Return the largest share of the funnel's last width that the disturbance takes."""
-    loop = loop_at(mission, scheme, mission.timing.duration)
-    samples = mission.timing.samples - 1 if loop.sampled else min(mission.timing.samples - 1, _SAMPLES)
-    if not np.isfinite(loop.matrix).all():
+    path = driven_at_the_end(mission, scheme, 0.5)
+    if path is None:
         return float("inf")
-    with np.errstate(over="ignore", invalid="ignore"):
-        path = loop.pushed(samples)[samples // 2 :]
     names = [name for name, values in mission.target.items() for _ in values]
     signal = path[:, [name == funnel.signal for name in names]]
     lower, upper = (np.array(ca.DM(wall)).ravel() for wall in funnel.bounds.walls(mission.timing.duration))

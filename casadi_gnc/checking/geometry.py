@@ -17,6 +17,8 @@ from casadi_gnc.tables.disturbances import OrbitAndTorque
 
 #: Angle [rad] by which a frame may turn in a flight and still be taken to stand.
 _STANDS = 0.01
+#: Angle [rad] beyond which two frames are no longer one frame badly aligned.
+_ALIGNED = 0.2
 #: Largest condition number of the effectiveness that is no nuisance.
 _WELL_CONDITIONED = 100.0
 
@@ -91,6 +93,21 @@ def orbit_frame(environment: OrbitAndTorque, duration: float) -> Iterator[Check]
             'Add environment.corrected = ["orbit_frame_rate"] where the attitude is meant to follow the orbit.',
             "orbit rate times duration",
         )
+
+
+def believed_axes(known: Any, believed: Any) -> Check:
+    """Return the angle between the axes of attitude and rate and those in which actuators are believed, (3, 3) each."""
+    turn = np.array(ca.DM(known)).T @ np.array(ca.DM(believed))
+    return Check(
+        "geometry.believed_axes",
+        float(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1.0, 1.0))),
+        _ALIGNED,
+        "rad",
+        "fail",
+        "The software commands its actuators in other axes than those in which it measures attitude and rate.",
+        "Give inertia, actuators and limits of the effort in one frame: that of the measured rate.",
+        "angle of the rotation between both frames, against the largest error of an alignment",
+    )
 
 
 def rotation(name: str, matrix: Any, consequence: str, remedy: str) -> Check:

@@ -38,6 +38,8 @@ def target_state(mission: Mission) -> np.ndarray:
     return x
 
 
+#: Steps with which a continuous loop is followed at most; exact for a load that is held over each.
+_SAMPLES = 4_000
 #: Magnitude at which a growing state is held.
 _HUGE = 1e150
 #: Loops of this many (mission, scheme, time) are kept: several families look at the same ones.
@@ -132,6 +134,19 @@ class LinearLoop:
             joint = linalg.expm(h * np.block([[self.matrix, np.eye(size)], [np.zeros((size, 2 * size))]]))
             step, push = joint[:size, :size], moved @ joint[:size, size:].T
         return driven(step, push)[:, : len(rows)]
+
+
+def driven_at_the_end(mission: Mission, scheme: Scheme, part: float) -> np.ndarray | None:
+    """Return where the disturbance drives the regulated states in the last part of the flight, (K, n).
+
+    None where the loop has no slope at its target.
+    """
+    loop = loop_at(mission, scheme, mission.timing.duration)
+    samples = mission.timing.samples - 1 if loop.sampled else min(mission.timing.samples - 1, _SAMPLES)
+    if not np.isfinite(loop.matrix).all():
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        return loop.pushed(samples)[samples - int(part * samples) :]
 
 
 def driven(step: np.ndarray, push: np.ndarray) -> np.ndarray:

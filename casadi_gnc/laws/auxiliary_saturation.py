@@ -33,12 +33,18 @@ Source: Tao, Zhang (2019), doi:10.16356/j.1005-1120.2019.04.008.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.checks import Check, sufficient
 from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.exact import is_number
+
+#: Time [s] of saturation that a manoeuvre should at least be able to have.
+_LASTING = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +74,25 @@ class AuxiliarySaturation:
     def start(self) -> Any:
         """Return the first value of the memory `gain`."""
         return self.first_gain if self.singular_gain else self.first_gain**2
+
+    def checks(self, part: str) -> Iterator[Check]:
+        """Yield the proof's condition on b1, and how long the printed k stays away from where its rate is singular."""
+        numbers = (self.threshold, self.softness, self.growth, self.first_gain)
+        if not all(map(is_number, numbers)):
+            return
+        yield sufficient(f"gains.auxiliary_threshold.{part}", self.threshold, self.softness, "-", "b1 >= b2")
+        if self.singular_gain:
+            yield Check(
+                f"gains.auxiliary_gain.{part}",
+                self.first_gain**2 / (2 * self.growth * self.threshold),
+                _LASTING,
+                "s",
+                "fail",
+                "The auxiliary gain k falls to zero, and its printed rate divides by it: from there it jumps for ever.",
+                "Take gain_singular out of as_printed: the square of k has the same rate without the division.",
+                "time after which k is zero while the errors rest and c/b2 is one",
+                at_least=True,
+            )
 
     def gain(self, memory: Any) -> Any:
         """Return k."""

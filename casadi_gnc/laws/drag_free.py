@@ -140,7 +140,10 @@ class DragFree(Law):
         return self.prescribed_performance and super().keeps(signal)
 
     def checks(self) -> Iterator[Check]:
-        """Yield which funnels the sample period is too long for."""
+        """Yield how the auxiliary gains fare, and which funnels the sample period is too long for."""
+        for part, handling in (("attitude", self.torque_saturation), ("position", self.force_saturation)):
+            if handling != "none":
+                yield from getattr(self, part).auxiliary.checks(part)
         numbers = (self.hold, *(getattr(self, name) for name in gains_of(type(self))))
         if self.hold == 0 or not self.prescribed_performance or not all(map(exact.is_number, numbers)):
             return

@@ -8,6 +8,7 @@ _FAMILIES = (
     "geometry",
     "authority",
     "funnels",
+    "settling",
     "gains",
     "sampling",
     "noise",

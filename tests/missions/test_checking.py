@@ -239,6 +239,14 @@ def test_verdicts_are_computed():
     assert worst([]) == "ok"
 
 
+#: What is flown beside the corrected schemes to show what goes wrong without them; their flights are in docs/.
+WORSE = (
+    "huang2020/slew funnel_pinv funnel.flown.mrp",
+    "huang2020/slew pd_pinv settling.settling_time",
+    "huang2019/free_axes pd_pinv settling.settling_time",
+)
+
+
 @pytest.mark.parametrize(
     "problem",
     [
@@ -250,9 +258,10 @@ def test_verdicts_are_computed():
         "shi2020/docking",
     ],
 )
-def test_the_corrected_missions_have_nothing_wrong(problem):
+def test_the_corrected_missions_have_nothing_wrong_but_what_they_compare_with(problem):
     found = check(casadi_gnc.load(problem))
-    assert {each.verdict for each in found} <= {"ok", "note"}
+    wrong = {f"{problem} {each.scheme} {each.name}" for each in found if each.verdict in ("warn", "fail")}
+    assert wrong == {each for each in WORSE if each.startswith(f"{problem} ")}
     assert all(each.source for each in found)
     assert all(each.consequence.endswith(".") and each.remedy.endswith(".") for each in found)
 

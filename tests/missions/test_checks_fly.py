@@ -42,6 +42,10 @@ def misbehaves(flight: Flight, shows: dict[str, Any]) -> bool:
         return True
     if "status" in shows:
         return StepStatus[shows["status"]] in flight.statuses
+    if "metric" in shows:
+        return flight.metrics[shows["metric"]] is None
+    if "at_least" in shows:
+        return not flight.block(shows["signal"]).min() >= shows["at_least"]
     late = np.abs(flight.block(shows["signal"])[flight.time >= shows["after_s"]])
     return not late.max() <= shows["at_most"]
 

@@ -175,8 +175,10 @@ class CombinedSpacecraftCraft(Craft, Orientation):
         )
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
-        """Yield how far the frame of the attitude ought to turn, where it does not."""
+        """Yield how far the frame of the attitude ought to turn, where it does not, and what axes are believed in."""
         yield from geometry.orbit_frame(self.environment, mission.timing.duration)
+        if self.believed.turned() is not None:
+            yield geometry.believed_axes(self.matrix(), self.believed.matrix())
 
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether the thrusters leave an axis out."""

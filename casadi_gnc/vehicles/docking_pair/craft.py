@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from typing import Any, ClassVar, Literal, cast
 
 import casadi as ca
+import numpy as np
 from pydantic import Field, model_validator
 
 from casadi_gnc.allocation import Direct
-from casadi_gnc.checking import numbers
+from casadi_gnc.checking import flown, numbers
 from casadi_gnc.checks import Check
 from casadi_gnc.mechanics.relative_motion import EllipticOrbit, PairModel
 from casadi_gnc.missions.actuation import Actuation
@@ -170,9 +171,24 @@ class DockingPairCraft(Craft):
         return self.orbit.semi_major_axis_m * (1 - self.orbit.eccentricity)
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
-        """Yield whether the orbit is one, about the Earth."""
+        """Yield whether the orbit is one, about the Earth, and how near the target's centre the chaser comes."""
         if self.orbit.mu_m3_per_s2 > _EARTH:
             yield from numbers.orbit(self.orbit.eccentricity, self._perigee, EARTH_RADIUS)
+        closest = max(math.hypot(*self.port_m) / 2, 2 * (self.coil_radius_m or 0.0))
+        if closest and flown.can_fly(mission, scheme):
+            _, states = flown.path(mission, scheme)
+            distance = np.linalg.norm(states[:, mission.truth.state.place("position")], axis=1)
+            yield Check(
+                "docking.clearance",
+                float(distance.min()),
+                closest,
+                "m",
+                "fail",
+                "On its way to the port the chaser flies through the target: the law knows nothing of it.",
+                "Start on the port's side of the target, or lead the chaser there by way points.",
+                "least distance of the centres without noise, against half of the port's and two radii of a coil",
+                at_least=True,
+            )
 
     def notes(self) -> tuple[str, ...]:
         """Return what the models leave out."""
