@@ -1,6 +1,6 @@
-"""Bodies and what moves them: attitude, rigid bodies, wheels, thrusters, dipoles, orbits, disturbances, faults."""
+"""Bodies and what moves and measures them: attitude, rigid bodies, actuators, orbits, fields, sensors, faults."""
 
-from casadi_gnc.mechanics import attitude, dipoles, earth, geomagnetic, orbits, quaternions
+from casadi_gnc.mechanics import attitude, dipoles, earth, geomagnetic, orbits, plates, quaternions, sensors
 from casadi_gnc.mechanics.actuator_faults import ActuatorFault, FaultSchedule
 from casadi_gnc.mechanics.circular_orbit import CircularOrbit
 from casadi_gnc.mechanics.disturbances import Harmonics, OrbitalDisturbance
@@ -29,5 +29,7 @@ __all__ = [
     "geomagnetic",
     "inverse3",
     "orbits",
+    "plates",
     "quaternions",
+    "sensors",
 ]
