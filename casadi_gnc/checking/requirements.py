@@ -18,7 +18,8 @@ from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.recording import row_of
 from casadi_gnc.missions.requirements import Requirement
-from casadi_gnc.missions.requirements.normal import BEYOND, Bound, Held, Join, Margin, Node, Until, Window
+from casadi_gnc.missions.requirements.normal import Bound
+from casadi_gnc.missions.requirements.tree import BEYOND, Held, Join, Margin, Node, Until, Window
 from casadi_gnc.missions.scheme import Metric, Scheme
 
 #: The least and the largest that a robustness can become.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from casadi_gnc.missions.requirements.normal import BEYOND, Held, Join, Margin, Node, Until, Window
+from casadi_gnc.missions.requirements.tree import BEYOND, Held, Join, Margin, Node, Until, Window
 
 
 def robustness(node: Node, margins: np.ndarray) -> np.ndarray:
@@ -12,7 +12,7 @@ def robustness(node: Node, margins: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    node : of `casadi_gnc.missions.requirements.normal`.
+    node : of `casadi_gnc.missions.requirements.tree`.
     margins : (M, K), of each comparison at each sample.
 
     Returns

@@ -23,7 +23,8 @@ import casadi as ca
 
 from casadi_gnc.errors import RequirementError
 from casadi_gnc.mathematics import bounds
-from casadi_gnc.missions.requirements.normal import BEYOND, Bound, Held, Join, Margin, Node, Until, Window
+from casadi_gnc.missions.requirements.normal import Bound
+from casadi_gnc.missions.requirements.tree import BEYOND, Held, Join, Margin, Node, Until, Window
 
 #: Verdicts of a monitor: nothing can be said yet; met, or not met, whatever comes.
 OPEN, MET, NOT_MET = 0, 1, 2
