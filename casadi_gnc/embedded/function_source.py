@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from casadi_gnc.embedded.controller import Options
-from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction
+from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction, to_text
+from casadi_gnc.embedded.manifest import digest
 from casadi_gnc.embedded.members import access, declaration
 from casadi_gnc.embedded.parts import Parts
 from casadi_gnc.signals import Layout
@@ -54,6 +55,7 @@ def common(own: FlightFunction, options: Options) -> dict[str, Any]:
         "name": options.name,
         "NAME": options.name.upper(),
         "title": own.title,
+        "identity": digest(to_text(own))[:16],
         "real": options.real,
         "period": options.constant(own.period) if own.period else "",
         "inputs": _members(own, own.inputs),

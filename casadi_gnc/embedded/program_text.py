@@ -10,42 +10,16 @@ import heapq
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import casadi as ca
 
+from casadi_gnc.embedded.program_order import Copy, Item, Order, Store
 from casadi_gnc.embedded.programs import Call, Port, Program
-from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Real, c_constant, expression, uses
+from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Real, c_constant, expression
 from casadi_gnc.errors import PrinterError
 
 #: Most statements of one C function.
 LENGTH = 1000
-#: From so many numbers on, what lies side by side is copied by a loop.
-_RUN = 8
-_PLACE = re.compile(r"(\w+)\[(\d+)\]")
-
-
-@dataclass(frozen=True)
-class _Copy:
-    """Copy numbers that lie side by side."""
-
-    target: str
-    at: int
-    source: str
-    start: int
-    count: int
-
-
-@dataclass(frozen=True)
-class _Store:
-    """Store a scalar in a result."""
-
-    target: str
-    at: int
-    node: int
-
-
-_Item = int | Call | _Copy | _Store
 
 
 def declare(name: str, inputs: Iterable[Port], outputs: Iterable[Port], asks: bool) -> str:
@@ -64,93 +38,15 @@ class _Printer:
         self._real: Real = real
         self._nodes = program.nodes
         self._zero, self._one = c_constant(0.0, real), c_constant(1.0, real)
-        wanted = [node for *_, node in program.stores]
-        wanted += [node for call in program.calls for argument in call.arguments for node in argument]
-        self._used, self._compared = uses(self._nodes, wanted)
-        self._place: dict[int, tuple[str, int]] = {}
-        for k in self._used:
-            if self._nodes[k].code == ca.OP_INPUT:
-                found = _PLACE.fullmatch(self._nodes[k].place)
-                assert found is not None
-                self._place[k] = found[1], int(found[2])
+        self._order = Order(program)
         self._numbers = {call: i for i, call in enumerate(program.calls)}
-
-    # ---- What is done, in order -------------------------------------------------------------------
-
-    def items(self) -> list[_Item]:
-        """Return the statements in an order in which everything is known before it is used."""
-        done: set[int] = set()
-        items: list[_Item] = []
-        copies, copied = self._copies()
-        stores: dict[int, list[_Store]] = {}
-        for target, at, node in self._program.stores:
-            if (target, at) not in copied:
-                stores.setdefault(node, []).append(_Store(target, at, node))
-
-        def need(wanted: Iterable[int]) -> None:
-            todo, fresh = [k for k in wanted if k not in done], set()
-            while todo:
-                k = todo.pop()
-                if k not in done and k not in fresh:
-                    fresh.add(k)
-                    todo += self._nodes[k].operands
-            for k in sorted(fresh):
-                items.append(k)
-                items.extend(stores.pop(k, ()))
-            done.update(fresh)
-
-        for call in self._program.calls:
-            for argument in call.arguments:
-                if self._source(argument) is None:
-                    need(argument)
-            items.append(call)
-        need(node for _, at, node in self._program.stores if node in stores)
-        for each in stores.values():
-            items.extend(each)
-        return items + copies
-
-    def _copies(self) -> tuple[list[_Item], set[tuple[str, int]]]:
-        """Return the copies of whole runs of inputs or results into results, and which elements they fill."""
-        copies: list[_Item] = []
-        filled: set[tuple[str, int]] = set()
-        run: list[tuple[str, int, int]] = []
-
-        def close() -> None:
-            if len(run) >= _RUN:
-                (target, at, _), (source, start) = run[0], self._place[run[0][2]]
-                copies.append(_Copy(target, at, source, start, len(run)))
-                filled.update((target, i) for target, i, _ in run)
-            run.clear()
-
-        for store in sorted(self._program.stores):
-            if store[2] not in self._place:
-                close()
-                continue
-            if run:
-                (target, at, _), (source, start) = run[-1], self._place[run[-1][2]]
-                if (target, at + 1, (source, start + 1)) != (*store[:2], self._place[store[2]]):
-                    close()
-            run.append(store)
-        close()
-        return copies, filled
-
-    def _source(self, argument: tuple[int, ...]) -> tuple[str, int] | None:
-        """Return where an argument already lies as an array, if it does."""
-        places = [self._place.get(k) for k in argument]
-        if not places or places[0] is None:
-            return None
-        name, start = places[0]
-        return (name, start) if places == [(name, start + i) for i in range(len(places))] else None
-
-    def _is_table(self, argument: tuple[int, ...]) -> bool:
-        return len(argument) > 3 and all(self._nodes[k].code == ca.OP_CONST for k in argument)
 
     # ---- The text of a statement ---------------------------------------------------------------------
 
     def _constant(self, k: int) -> str:
         # A bound beyond the largest float is met by every finite float and by no infinite one.
         number = self._nodes[k].number
-        if self._real == "float" and k in self._compared and math.isfinite(number):
+        if self._real == "float" and k in self._order.compared and math.isfinite(number):
             number = min(max(number, -LARGEST_FLOAT), LARGEST_FLOAT)
         return c_constant(number, self._real)
 
@@ -164,7 +60,7 @@ class _Printer:
         if node.code == ca.OP_CONST:
             text = self._constant(k)
         elif node.code == ca.OP_INPUT:
-            text = _at(*self._place[k], arrays)
+            text = _at(*self._order.place[k], arrays)
         else:
             text = expression(node, [self._nodes[i].is_flag for i in node.operands], self._maths, self._real)
             text = text.format(*(f"a{i}" for i in node.operands))
@@ -174,25 +70,25 @@ class _Printer:
         """Return the statements of a call; `arrays` holds the places of arrays that are part of one large one."""
         number, lines, given = self._numbers[call], [], []
         for i, argument in enumerate(call.arguments):
-            name, source = f"c{number}_{i}", self._source(argument)
+            name, source = f"c{number}_{i}", self._order.source(argument)
             if source is not None:
                 given.append(_pointer(*source, arrays))
                 continue
-            if argument and not self._is_table(argument):
+            if argument and not self._order.is_table(argument):
                 lines += [f"{_at(name, n, arrays)} = {self._number(k)};" for n, k in enumerate(argument)]
             given.append(_pointer(name, 0, arrays) if argument else "0")
         given += [_pointer(port.name, 0, arrays) if port.size else "0" for port in call.results]
         given += ["status"] if call.callee.asks else []
         return [*lines, f"{call.callee.name}({', '.join(given)});"]
 
-    def statement(self, item: _Item, arrays: dict[str, int]) -> list[str]:
+    def statement(self, item: Item, arrays: dict[str, int]) -> list[str]:
         """Return the C of one item."""
         if isinstance(item, Call):
             return self.call(item, arrays)
-        if isinstance(item, _Copy):
+        if isinstance(item, Copy):
             source = _pointer(item.source, item.start, arrays)
             return [f"copy_numbers({item.count}, {source}, {_pointer(item.target, item.at, arrays)});"]
-        if isinstance(item, _Store):
+        if isinstance(item, Store):
             return [f"{item.target}[{item.at}] = {self._number(item.node)};"]
         return [self.scalar(item, arrays)]
 
@@ -201,7 +97,7 @@ class _Printer:
         lines = []
         for call in self._program.calls:
             for i, argument in enumerate(call.arguments):
-                if self._is_table(argument):
+                if self._order.is_table(argument):
                     values = ", ".join(self._constant(k) for k in argument)
                     name = f"c{self._numbers[call]}_{i}"
                     lines.append(f"static const gnc_real {name}[{len(argument)}] = {{{values}}};")
@@ -214,7 +110,7 @@ class _Printer:
             found += [
                 Port(f"c{self._numbers[call]}_{i}", len(argument))
                 for i, argument in enumerate(call.arguments)
-                if argument and self._source(argument) is None and not self._is_table(argument)
+                if argument and self._order.source(argument) is None and not self._order.is_table(argument)
             ]
             found += [port for port in call.results if port.size]
         return found
@@ -223,7 +119,7 @@ class _Printer:
 
     def text(self) -> str:
         """Return the C of the program."""
-        items = self.items()
+        items = self._order.items()
         head = declare(self._name, self._program.inputs, self._program.outputs, self._program.asks)
         if len(items) <= LENGTH:
             body = [f"gnc_real {port.name}[{port.size}];" for port in self.arrays()] + self.tables()
@@ -236,7 +132,7 @@ class _Printer:
         names += ["status"] if self._program.asks else []
         return [f"(void){name};" for name in names if not re.search(rf"\b{name}\b", body)]
 
-    def _pieces(self, head: str, items: list[_Item]) -> str:
+    def _pieces(self, head: str, items: list[Item]) -> str:
         rows = [items[i : i + LENGTH] for i in range(0, len(items), LENGTH)]
         arrays: dict[str, int] = {}
         room = 0
@@ -259,7 +155,7 @@ class _Printer:
             body.append(f"{part}({', '.join(name for name, _ in given)});")
         return "\n".join([*texts, _function(head, body, self._unused("\n".join(body)))])
 
-    def _slots(self, rows: list[list[_Item]], room: int) -> tuple[dict[int, int], int]:
+    def _slots(self, rows: list[list[Item]], room: int) -> tuple[dict[int, int], int]:
         """Return the place of each scalar that a later row uses, and the numbers of the whole array."""
         home = {item: r for r, row in enumerate(rows) for item in row if isinstance(item, int)}
         last: dict[int, int] = {}
@@ -282,21 +178,21 @@ class _Printer:
                 heapq.heappush(free, slot)
         return slots, room
 
-    def _read(self, row: list[_Item]) -> set[int]:
+    def _read(self, row: list[Item]) -> set[int]:
         """Return the scalars that a row reads."""
         found: set[int] = set()
         for item in row:
             if isinstance(item, int):
                 found.update(self._nodes[item].operands)
-            elif isinstance(item, _Store):
+            elif isinstance(item, Store):
                 found.add(item.node)
             elif isinstance(item, Call):
                 for argument in item.arguments:
-                    if self._source(argument) is None and not self._is_table(argument):
+                    if self._order.source(argument) is None and not self._order.is_table(argument):
                         found.update(argument)
         return found
 
-    def _row(self, row: list[_Item], slots: dict[int, int], arrays: dict[str, int]) -> list[str]:
+    def _row(self, row: list[Item], slots: dict[int, int], arrays: dict[str, int]) -> list[str]:
         """Return the statements of one function of a row: what it takes over, does and leaves."""
         own = {item for item in row if isinstance(item, int)}
         lines = []

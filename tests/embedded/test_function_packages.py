@@ -1,5 +1,6 @@
 """Packages of functions: what is written, what it says of bad inputs, what verification finds, and what is refused."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -74,6 +75,8 @@ def test_header_and_readme_say_names_shapes_units_and_the_period(package):
     assert "#define LAW_PERIOD_S 0.01" in header
     assert "`i[0]` = 0.25, `i[1]` = -0.5" in readme
     assert "| 4 | `LAW_SINGULAR` |" in readme
+    kept = hashlib.sha256((package / "function.json").read_bytes()).hexdigest()
+    assert f'#define LAW_IDENTITY "law {kept[:16]} double"' in header
 
 
 def test_verification_rebuilds_the_saved_function_and_demands_the_shipped_words(package, tmp_path):

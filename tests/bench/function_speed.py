@@ -1,0 +1,117 @@
+"""Time functions as printed here against CasADi's own C: its default, and expanded with common parts taken out.
+
+    python tests/bench/function_speed.py
+
+Processor time of one call in nanoseconds, the least of several runs, both compiled with -O2, ours with the elementary
+functions that are the same everywhere; then the shifted geometric mean of the ratios of times (shift 10 ns).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import sys
+import tempfile
+import time
+from importlib import import_module
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from casadi_gnc.embedded.parts import Parts
+from casadi_gnc.system import assets, compilers
+
+sys.path[:0] = [str(Path(__file__).parents[1] / "oracles"), str(Path(__file__).parents[1] / "embedded")]
+functions_of = import_module("test_function_set")
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fPIC", "-shared", "-w")
+RUNS, LEAST_NS, SHIFT = 7, 5e6, 10.0
+
+LOOP = """
+void bench(const double **given, double **found, long long *iw, double *w, long times);
+void bench(const double **given, double **found, long long *iw, double *w, long times)
+{
+    long k;
+    for (k = 0; k < times; ++k) {
+        %s
+        __asm__ volatile("" : : "r"(given), "r"(found) : "memory");
+    }
+}
+"""
+
+
+def ours(function: ca.Function) -> str:
+    """Return the C that is printed here."""
+    parts = Parts()
+    callee = parts.function(function)
+    given = [f"given[{i}]" for i in range(function.n_in())] + [f"found[{i}]" for i in range(function.n_out())]
+    head = '#include <stdint.h>\n#include "gnc_math.h"\ntypedef double gnc_real;\ntypedef _Bool gnc_flag;\n'
+    head += "#define GNC_APART __attribute__((noinline))\n#define GNC_SINGULAR 4\n"
+    return head + parts.text() + LOOP % f"{callee.name}({', '.join(given)});"
+
+
+def casadis(function: ca.Function, *, best: bool) -> str:
+    """Return CasADi's own C."""
+    if best and function.is_a("MXFunction"):
+        with contextlib.suppress(RuntimeError):
+            function = function.expand()
+    if best and function.is_a("SXFunction"):
+        x = function.sx_in()
+        function = ca.Function(function.name(), x, ca.cse(function.call(x)))
+    generator = ca.CodeGenerator("c.c")
+    generator.add(function)
+    return generator.dump() + LOOP % f"{function.name()}(given, found, iw, w, 0);"
+
+
+def nanoseconds(text: str, function: ca.Function) -> float:
+    """Return the least processor time of a call."""
+    rng = np.random.default_rng(1)
+    given = [rng.normal(size=max(function.nnz_in(i), 1)) for i in range(function.n_in())]
+    found = [np.zeros(max(function.nnz_out(i), 1)) for i in range(function.n_out())]
+    room = [np.zeros(100_000), np.zeros(100_000, np.int64)]
+    with tempfile.TemporaryDirectory() as place:
+        (Path(place) / "f.c").write_text(text)
+        words = [*FLAGS, f"-I{assets.folder('codegen') / 'runtime'}", "-o", f"{place}/f.so", f"{place}/f.c", "-lm"]
+        compilers.compile_in(Path(place), compilers.find(), words, "a function")
+        c = ctypes.CDLL(f"{place}/f.so")
+
+    def pointers(arrays: list[np.ndarray]) -> ctypes.Array:
+        # Ports beyond the last are work space of CasADi's C.
+        return (ctypes.c_void_p * (len(arrays) + 1000))(*(each.ctypes.data for each in arrays))
+
+    def run(times: int) -> float:
+        begun = time.process_time_ns()
+        c.bench(
+            pointers(given),
+            pointers(found),
+            *(ctypes.c_void_p(each.ctypes.data) for each in room[::-1]),
+            ctypes.c_long(times),
+        )
+        return float(time.process_time_ns() - begun)
+
+    times = 10
+    while run(times) < LEAST_NS:
+        times *= 4
+    return min(run(times) for _ in range(RUNS)) / times
+
+
+def main() -> None:
+    """Print a line a function, and the means."""
+    own = functions_of
+    functions = [own.network(), own.kalman(solve=False), *own.steps_of_missions(), *own.shapes()[-12:]]
+    functions += [own.random_graph(seed, 150) for seed in range(3)]
+    rows = []
+    for function in functions:
+        texts = ours(function), casadis(function, best=False), casadis(function, best=True)
+        rows.append([nanoseconds(text, function) for text in texts])
+        print(
+            f"{function.name():12} {function.n_instructions():6}", *(f"{each:10.1f}" for each in rows[-1]), flush=True
+        )
+    times = np.array(rows) + SHIFT
+    for i, name in ((1, "default"), (2, "best options")):
+        print(f"CasADi's C, {name}: {np.exp(np.log(times[:, i] / times[:, 0]).mean()):.2f} times our time")
+
+
+if __name__ == "__main__":
+    main()
