@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import platform
-from importlib import metadata, util
 from typing import Annotated, Any
 
 import typer
@@ -56,6 +54,9 @@ def _names_in_the_way() -> list[str]:
 
 def examine() -> dict[str, Any]:
     """Return what the doctor finds, as plain data."""
+    import platform
+    from importlib import metadata, util
+
     from casadi_gnc.allocation import backends
     from casadi_gnc.embedded import boards
     from casadi_gnc.system import compilers

@@ -18,6 +18,7 @@ from casadi_gnc.cli import (
     campaign,
     catalogue,
     check,
+    demo,
     doctor,
     fly,
     generate,
@@ -59,6 +60,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+app.command("demo")(demo.demo)
 app.command("fly")(_about_its_file(fly.fly))
 app.command("campaign")(campaign.campaign)
 app.command("check")(check.check)
