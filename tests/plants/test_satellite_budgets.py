@@ -8,6 +8,7 @@ from scipy.optimize import linprog
 
 import casadi_gnc
 from casadi_gnc.vehicles.satellite import SatelliteCraft, budgets
+from casadi_gnc.vehicles.satellite.reference_tables import TableTable
 
 BODY = {"mass_kg": 90.0, "inertia_kg_m2": np.diag([9.0, 11.0, 7.0]).tolist()}
 WHEELS = [
@@ -63,3 +64,14 @@ def test_slews_and_coils_are_weighed():
     )
     weak = {each.name: each for each in casadi_gnc.check(over_the_equator)}["authority.dipole_over_orbit"]
     assert weak.verdict == "warn"
+
+
+def test_a_table_that_ends_early_is_told():
+    """The slew's file with a table in its place: 300 s are flown."""
+    rows = [[math.cos(0.1 * i), 0.0, math.sin(0.1 * i), 0.0] for i in range(3)]
+    for end, verdict in ((200.0, "fail"), (300.0, "ok")):
+        table = {"kind": "table", "times_s": [0.0, 100.0, end], "quaternions_scalar_first": rows}
+        mission = casadi_gnc.load("satellites/slew")
+        craft = mission.craft.model_copy(update={"reference": [TableTable(**table)]})
+        (found,) = [each for each in budgets.checks(craft, mission) if each.name == "geometry.reference_1_end"]
+        assert found.verdict == verdict

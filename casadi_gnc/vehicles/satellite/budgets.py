@@ -28,7 +28,7 @@ from casadi_gnc.checks import Check
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.mechanics.orbits import Orbit
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.navigation import Slew, Timeline
+from casadi_gnc.navigation import Reference, Slew, Table, Timeline
 
 from . import part_tables
 
@@ -44,7 +44,7 @@ _SEEN = 0.1
 
 
 def checks(craft: SatelliteCraft, mission: Mission) -> Iterator[Check]:
-    """Yield momentum over an orbit, torque and momentum of slews, and what coils reach over the orbit."""
+    """Yield momentum over an orbit, torque and momentum of slews, what coils reach, and whether tables last."""
     if craft.wheel:
         axes = np.array(part_tables.directions(craft.wheel, "axis"))
         torques = np.array([float(each.max_torque_N_m) for each in craft.wheel])
@@ -54,6 +54,7 @@ def checks(craft: SatelliteCraft, mission: Mission) -> Iterator[Check]:
         yield from _slews(craft, axes, torques, stored)
     if craft.magnetorquer:
         yield _coils(craft, mission)
+    yield from _tables(craft, mission)
 
 
 def reach(axes: np.ndarray, most: np.ndarray, direction: np.ndarray | None = None) -> float:
@@ -111,10 +112,8 @@ def _momentum(craft: SatelliteCraft, mission: Mission, capacity: float) -> Check
 
 
 def _slews(craft: SatelliteCraft, axes: np.ndarray, torques: np.ndarray, stored: np.ndarray) -> Iterator[Check]:
-    pointed = craft.pointed()
-    steps = pointed.steps if isinstance(pointed, Timeline) else ((0.0, pointed),)
     inertia = np.array(ca.DM(craft.belief().inertia))
-    for i, (_, slew) in enumerate(steps, 1):
+    for i, (_, slew) in enumerate(_steps(craft), 1):
         if not isinstance(slew, Slew) or slew.turn[1] == 0.0:
             continue
         turned = inertia @ np.array(slew.turn[0])
@@ -135,6 +134,30 @@ def _slews(craft: SatelliteCraft, axes: np.ndarray, torques: np.ndarray, stored:
                     "Lower rate_limit_deg_per_s and acceleration_limit_deg_per_s2, or take larger wheels.",
                     "J times the slew's acceleration or largest rate, against the wheels' reach along it",
                 )
+
+
+def _tables(craft: SatelliteCraft, mission: Mission) -> Iterator[Check]:
+    steps = _steps(craft)
+    ends = [*(start for start, _ in steps[1:]), mission.timing.duration]
+    for i, ((_, one), needed) in enumerate(zip(steps, ends, strict=True), 1):
+        if isinstance(one, Table):
+            yield Check(
+                f"geometry.reference_{i}_end",
+                float(one.times[-1]),
+                float(needed),
+                "s",
+                "fail",
+                f"The table of reference {i} ends before it is needed no more: the attitude stands from there on.",
+                "Give later rows, or another [[reference]] from then on.",
+                "last time of the table against the next reference, or the end of the flight",
+                at_least=True,
+            )
+
+
+def _steps(craft: SatelliteCraft) -> list[tuple[float, Reference]]:
+    """Return the references, each with the time from which it counts."""
+    pointed = craft.pointed()
+    return list(pointed.steps) if isinstance(pointed, Timeline) else [(0.0, pointed)]
 
 
 def _coils(craft: SatelliteCraft, mission: Mission) -> Check:
