@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.mathematics.linear import solve_symmetric
 from casadi_gnc.mechanics import attitude
+from casadi_gnc.mechanics.appendages import FlexibleModes, SloshMasses
 from casadi_gnc.mechanics.multibody import Assembly
-from casadi_gnc.mechanics.satellite_parts import FlexibleModes, SloshMasses, Thrusters, Wheels
+from casadi_gnc.mechanics.satellite_parts import Thrusters, Wheels
 from casadi_gnc.vehicles.satellite import SatelliteCraft
 from casadi_gnc.vehicles.satellite.momentum import MomentumSharing
 

@@ -1,6 +1,6 @@
 """What a satellite carries, one table each: [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]].
 
-Positions and axes are in the body frame. Tables of one kind become one part of `casadi_gnc.mechanics.satellite_parts`.
+Positions and axes are in the body frame. Tables of one kind become one part of `casadi_gnc.mechanics`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pydantic import Field, field_validator, model_validator
 
 from casadi_gnc.mathematics import exact
 from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mechanics import appendages
 from casadi_gnc.mechanics import satellite_parts as parts
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
@@ -153,9 +154,9 @@ def magnetorquers(tables: Sequence[MagnetorquerTable]) -> parts.Magnetorquers:
     return parts.Magnetorquers(directions(tables, "axis"))
 
 
-def modes(tables: Sequence[FlexibleModeTable]) -> parts.FlexibleModes:
+def modes(tables: Sequence[FlexibleModeTable]) -> appendages.FlexibleModes:
     """Return the modes as one part."""
-    return parts.FlexibleModes(
+    return appendages.FlexibleModes(
         array([2 * math.pi * table.frequency_Hz for table in tables]),
         _of(tables, "damping"),
         columns(tables, "rotation_kg05_m"),
@@ -164,10 +165,10 @@ def modes(tables: Sequence[FlexibleModeTable]) -> parts.FlexibleModes:
     )
 
 
-def slosh(tables: Sequence[SloshTable]) -> parts.SloshMasses:
+def slosh(tables: Sequence[SloshTable]) -> appendages.SloshMasses:
     """Return the sloshing masses as one part."""
     turns = [2 * math.pi * table.frequency_Hz for table in tables]
-    return parts.SloshMasses(
+    return appendages.SloshMasses(
         _of(tables, "mass_kg"),
         columns(tables, "position_m"),
         directions(tables, "axis"),
