@@ -37,6 +37,7 @@ FLOWN = {
     "shi2020/docking": ("iobc", ["spacecraft.target_mass_kg", "initial.position_m"]),
     "sun2018/circular_orbit": (None, ["spacecraft.mass_kg", "initial.position_error_m"]),
     "tao2019/case1": (None, ["spacecraft.mass_kg", "initial.mrp"]),
+    "satellites/earth_pointing": (None, ["truth.inertia_factor"]),
 }
 KINDS = list(VECTORS)[: list(VECTORS).index(best_vectors()) + 1]
 
@@ -73,7 +74,8 @@ def every_mission():
 
 @pytest.mark.parametrize("name", [*few_quickly(FLOWN), *every_mission()])
 def test_lanes_and_threads_have_the_words_of_single_flights(name):
-    scheme, keys = FLOWN.get(name, (None, ["initial.*"]))
+    some = "truth.inertia_factor" if name.startswith("satellites/") else "initial.*"
+    scheme, keys = FLOWN.get(name, (None, [some]))
     varied = vary(short(name, 60), keys, scheme)
     cases = 257  # no multiple of the lanes
     turns = np.sin(np.arange(cases * varied.parameters.size)).reshape(cases, -1)
