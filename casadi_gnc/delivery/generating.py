@@ -57,12 +57,6 @@ def generate(
     ------
     GncError
         Where something given is not right; the folder is left as it was.
-
-    Examples
-    --------
-    >>> x, i = ca.SX.sym("x"), ca.SX.sym("i")
-    >>> law = ca.Function("law", [x, i], [-2 * x - i, i + 0.01 * x], ["x", "i"], ["u", "i_next"])
-    >>> about = generate(law, "fw/law", state={"i": "i_next"}, rate=100)  # doctest: +SKIP
     """
     common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force}
     of_missions = {"scheme": scheme, "tunable": tunable}

@@ -91,7 +91,7 @@ def test_fmu(tmp_path):
     ("words", "sentence"),
     [
         (("generate", "huang2020/slew", "--name", "while"), "'while' is a keyword of C or C++"),
-        (("generate", "huang2020/allocation"), "kind is \"allocation\"|kind is 'allocation'"),
+        (("generate", "shi2020/synthesis"), "kind is \"synthesis\"|kind is 'synthesis'"),
         (("generate", "huang2020/slew", "--tunable", "mass"), "'mass' is no gain"),
         (("generate", "huang2020/slew", "--target", "z80"), "no target 'z80'"),
         (("verify", "."), "is no package"),

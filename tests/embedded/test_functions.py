@@ -149,3 +149,11 @@ def test_what_has_no_c_form_is_refused_by_name_with_what_to_do(name):
     with pytest.raises(PrinterError, match=sentence) as told:
         Parts().function(function)
     assert "\n" not in str(told.value)
+
+
+def test_functions_of_too_many_operations_are_refused_with_their_size(monkeypatch):
+    monkeypatch.setattr("casadi_gnc.embedded.programs.MOST_OPERATIONS", 1000)
+    with pytest.raises(
+        PrinterError, match=r"long has \d+ operations, expected at most 1000; write what repeats as a map"
+    ):
+        Parts().function(long_function(10_000))
