@@ -80,12 +80,12 @@ def triangle(name: str, inertia: np.ndarray) -> Check:
     )
 
 
-def orbit_frame(environment: OrbitAndTorque, duration: float) -> Iterator[Check]:
-    """Yield the angle by which the orbit frame turns in a flight [s] under an attitude that takes it to stand."""
-    if environment.frame_rate == 0:
+def orbit_frame(environment: OrbitAndTorque, mission: Mission) -> Iterator[Check]:
+    """Yield the angle by which the orbit frame turns in a flight under an attitude that is held as to where it was."""
+    if environment.frame_rate == 0 and "mrp" in mission.target:
         yield Check(
             "geometry.orbit_frame",
-            environment.orbit_rate_rad_per_s * duration,
+            environment.orbit_rate_rad_per_s * mission.timing.duration,
             _STANDS,
             "rad",
             "note",

@@ -176,7 +176,7 @@ class CombinedSpacecraftCraft(Craft, Orientation):
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
         """Yield how far the frame of the attitude ought to turn, where it does not, and what axes are believed in."""
-        yield from geometry.orbit_frame(self.environment, mission.timing.duration)
+        yield from geometry.orbit_frame(self.environment, mission)
         if self.believed.turned() is not None:
             yield geometry.believed_axes(self.matrix(), self.believed.matrix())
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def checks(craft: WheelSpacecraftCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the frames of attitude and wheels, the wheels' speed, and whether one weight bears errors and faults."""
-    yield from geometry.orbit_frame(craft.environment, mission.timing.duration)
+    yield from geometry.orbit_frame(craft.environment, mission)
     points = craft.wheels.as_points
     if points is not None:
         yield geometry.rotation(
