@@ -65,6 +65,10 @@ def _print(found: dict[str, Any]) -> None:
             f"{row['text_bytes']} B code, {row['data_bytes'] + row['bss_bytes']} B static data, "
             f"{row['stack_step_bytes']} B stack"
         )
+        bound = row["instructions_bound"]
+        proved = f"none takes more than {bound}" if bound else f"no bound: {row['instructions_bound_missing']}"
+        sought, dearest = row["instructions_climbed_steps"], row["instructions_climbed"]
+        _say(f"    {proved}; the dearest of {sought} sought takes {dearest}")
     for name, tools in found["not_installed"].items():
         _say(f"  {name}: not installed here ({', '.join(tools)}); make targets installs it")
     for warning in found["warnings"]:

@@ -143,7 +143,9 @@ def pack(
         measured = [
             {
                 "target": board.name,
-                **targets.measure(workshop, options.name, board, float_only=about["real"] == "float32").summary(),
+                **targets.measure(
+                    workshop, options.name, board, float_only=about["real"] == "float32", prove=True
+                ).summary(),
             }
             for board in boards
         ]

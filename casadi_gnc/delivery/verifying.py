@@ -93,7 +93,8 @@ def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, A
         comparisons += bench.made_anew()
         measured = []
         for board in boards:
-            found = targets.measure(bench.on_board(), about.name, board, float_only=about.real == "float32")
+            only = about.real == "float32"
+            found = targets.measure(bench.on_board(), about.name, board, float_only=only, prove=True, climb=True)
             lines = compare.differences(found.outputs, outputs, bench.layout)
             comparisons.append(_comparison(f"{board.name} against the shipped flight", lines, exact=True))
             measured.append({"target": board.name, "title": board.title, **found.summary()})
@@ -117,10 +118,20 @@ def verify(folder: str | Path, target: Sequence[Any] = ("host",)) -> dict[str, A
 
 
 def _is_sound(report: dict[str, Any]) -> bool:
-    """Tell whether no word differs, no file was edited, and the text is the one that this version writes, if it did."""
+    """Tell whether a package is as it was made.
+
+    No word differs, no step takes more than its bound, no file was edited, and the text is the one that this version
+    writes, if it did.
+    """
     strange = [change for change in report["edited"] if not change.endswith("(added)")]
     other = report["not_regenerated"] if report["made_by_this_version"] else []
-    return not (report["words"] or strange or other)
+    return not (report["words"] or strange or other or any(_is_exceeded(row) for row in report["targets"]))
+
+
+def _is_exceeded(row: dict[str, Any]) -> bool:
+    """Tell whether a step took more instructions than any can."""
+    bound, climbed = row["instructions_bound"], row["instructions_climbed"] or 0
+    return bound is not None and max(row["instructions_worst"], climbed) > bound
 
 
 def refuse_strangers(names: list[str], folder: Path) -> None:

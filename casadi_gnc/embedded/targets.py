@@ -16,6 +16,7 @@ import numpy as np
 
 from casadi_gnc.embedded import stack
 from casadi_gnc.embedded.boards import Target
+from casadi_gnc.embedded.worst_case import Counter
 from casadi_gnc.errors import TargetError
 from casadi_gnc.system import assets, folders
 from casadi_gnc.system.folders import workshop
@@ -46,6 +47,8 @@ class Measured:
     init_instructions : of init.
     step_stack, init_stack : bytes, by paint.
     step_bound : the deepest stack of a step that any input can ask for, from the compiler's call graph.
+    most_instructions : that any input can ask for, from the compiled text; or why there is no such bound.
+    climbed : the most instructions that a search over measurements found, and of how many steps; none without a search.
     state_size, params_size : bytes.
     text, data, bss : bytes of the package's own object files.
     compiler : version line.
@@ -57,6 +60,8 @@ class Measured:
     step_stack: int
     init_stack: int
     step_bound: stack.Stack
+    most_instructions: int | str
+    climbed: tuple[int, int] | None
     state_size: int
     params_size: int
     text: int
@@ -72,6 +77,10 @@ class Measured:
             "instructions_worst": int(self.instructions.max()),
             "instructions_first": int(self.instructions[0]),
             "instructions_init": self.init_instructions,
+            "instructions_bound": self.most_instructions if isinstance(self.most_instructions, int) else None,
+            "instructions_bound_missing": "" if isinstance(self.most_instructions, int) else self.most_instructions,
+            "instructions_climbed": self.climbed[0] if self.climbed else None,
+            "instructions_climbed_steps": self.climbed[1] if self.climbed else 0,
             "stack_step_bytes": self.step_stack,
             "stack_init_bytes": self.init_stack,
             "stack_step_bound_bytes": self.step_bound.bytes,
@@ -86,7 +95,16 @@ class Measured:
         }
 
 
-def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", float_only: bool = False) -> Measured:
+def measure(
+    folder: Path,
+    name: str,
+    target: Target,
+    *,
+    optimise: str = "-O2",
+    float_only: bool = False,
+    prove: bool = False,
+    climb: bool = False,
+) -> Measured:
     """Build a package for a target and replay its vectors there.
 
     Parameters
@@ -95,6 +113,8 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
     target : what for.
     optimise : flag of the optimiser.
     float_only : refuse objects that compute with doubles.
+    prove : bound the instructions of a step too; for an allocator that takes some seconds.
+    climb : search for the dearest step too, over changed measurements.
 
     Raises
     ------
@@ -111,15 +131,42 @@ def measure(folder: Path, name: str, target: Target, *, optimise: str = "-O2", f
         if float_only:
             _refuse_doubles(objects, target)
         board = assets.folder("codegen") / "targets"
-        extra = [folder / "test" / "vectors.c", board / "measure.c", *map(target.place, target.sources)]
-        rest = [_compile(source, shop, folder, target, _BOARD_FLAGS) for source in extra]
-        image = shop / "image.elf"
-        link = [target.compiler, *target.flags, *target.link, f"-T{target.place(target.script)}", "-Wl,--gc-sections"]
-        _run([*link, *map(str, objects + rest), "-lm", "-o", str(image)], target, shop)
-        words = _emulate(image, target, shop)
+        common = [folder / "test" / "vectors.c", *map(target.place, target.sources)]
+        objects_of_board = [_compile(source, shop, folder, target, _BOARD_FLAGS) for source in common]
+
+        def written(program: str, file: str) -> bytes:
+            main = _compile(board / f"{program}.c", shop, folder, target, _BOARD_FLAGS)
+            image = _link([*objects, *objects_of_board, main], shop / f"{program}.elf", target, shop)
+            return _emulate(image, target, shop, file)
+
+        words = written("measure", "words.bin")
+        climbed = np.frombuffer(written("climb", "climb.bin"), np.uint64).astype(int).tolist() if climb else None
+        most: int | str = "it was not asked for"
+        if prove:
+            most = _most_instructions(shop / "measure.elf", ("replay_step", f"{name}_step"), target, shop)
         text, data, bss = _size(objects, target)
         bound = stack.deepest([path.with_suffix(".ci") for path in objects], f"{name}_step")
-    return _read(words, text, data, bss, bound, _run([target.compiler, "--version"], target).splitlines()[0])
+    compiler = _run([target.compiler, "--version"], target).splitlines()[0]
+    return _read(words, text, data, bss, bound, compiler, most, (climbed[0], climbed[1]) if climbed else None)
+
+
+def _link(objects: list[Path], image: Path, target: Target, shop: Path) -> Path:
+    link = [target.compiler, *target.flags, *target.link, f"-T{target.place(target.script)}", "-Wl,--gc-sections"]
+    _run([*link, *map(str, objects), "-lm", "-o", str(image)], target, shop)
+    return image
+
+
+def _most_instructions(image: Path, entries: tuple[str, ...], target: Target, shop: Path) -> int | str:
+    """Return the instructions that no input of the first function there is exceeds, or why that is not known."""
+    if "-mthumb" not in target.flags:
+        return "only the instructions of Cortex-M are read"
+    text = _run([_tool(target, "objdump"), "-d", "--no-show-raw-insn", str(image)], target, shop)
+    _run([_tool(target, "objcopy"), "-O", "binary", "-j", ".text", str(image), str(shop / "image.bin")], target, shop)
+    try:
+        counter = Counter(text, (shop / "image.bin").read_bytes())
+        return counter.worst(next((entry for entry in entries if counter.has(entry)), entries[-1]), 4)
+    except TargetError as error:
+        return str(error)
 
 
 def units(folder: Path, name: str) -> list[Path]:
@@ -180,8 +227,8 @@ def _run(command: list[str], target: Target, shop: Path | None = None) -> str:
     return done.stdout
 
 
-def _emulate(image: Path, target: Target, shop: Path) -> bytes:
-    """Run an image in the emulator; return what it wrote."""
+def _emulate(image: Path, target: Target, shop: Path, file: str) -> bytes:
+    """Run an image in the emulator; return what it wrote to a file."""
     quiet = ["-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config", "enable=on,target=native"]
     command = [*target.emulator, *quiet, "-kernel", str(image)]
     try:
@@ -196,7 +243,7 @@ def _emulate(image: Path, target: Target, shop: Path) -> bytes:
             f"target {target.name}: the program {meaning.get(done.returncode, f'ended with {done.returncode}')}"
             f"{': ' + done.stderr.strip().splitlines()[0] if done.stderr.strip() else ''}"
         )
-    return (shop / "words.bin").read_bytes()
+    return (shop / file).read_bytes()
 
 
 def _size(objects: list[Path], target: Target) -> tuple[int, int, int]:
@@ -205,7 +252,16 @@ def _size(objects: list[Path], target: Target) -> tuple[int, int, int]:
     return tuple(sum(column) for column in zip(*columns, strict=True))  # type: ignore[return-value]
 
 
-def _read(raw: bytes, text: int, data: int, bss: int, bound: stack.Stack, compiler: str) -> Measured:
+def _read(
+    raw: bytes,
+    text: int,
+    data: int,
+    bss: int,
+    bound: stack.Stack,
+    compiler: str,
+    most: int | str,
+    climbed: tuple[int, int] | None,
+) -> Measured:
     head = np.frombuffer(raw[: 8 * _NUMBERS], np.uint64).astype(int)
     steps, outputs, empty, init, init_stack, step_stack, state, params = head
     counts = np.frombuffer(raw[8 * _NUMBERS : 8 * (_NUMBERS + steps)], np.uint64).astype(int)
@@ -214,5 +270,5 @@ def _read(raw: bytes, text: int, data: int, bss: int, bound: stack.Stack, compil
     words = np.frombuffer(rest, word).reshape(steps, outputs)
     return Measured(
         words, counts - empty, int(init - empty), int(step_stack), int(init_stack),
-        bound, int(state), int(params), text, data, bss, compiler,
+        bound, most, climbed, int(state), int(params), text, data, bss, compiler,
     )  # fmt: skip

@@ -127,34 +127,15 @@ static int follow_sets(workspace_t *work, const data_t *data, command_t *command
     int certified = 0;
     *iterations = 0;
     if (work->warm != 0) {
-        certified = NAME(active_set)(work, data, command, point, iterations);
+        certified = NAME(active_set)(work, data, command, point, WARM_WORK, iterations);
     }
     if (!certified) {
         int32_t more = 0;
         work->warm = 0;
         work->smooth = 0;
         work->stamp = 0;
-        certified = NAME(active_set)(work, data, command, point, &more);
+        certified = NAME(active_set)(work, data, command, point, COLD_WORK, &more);
         *iterations += more;
-    }
-    return certified;
-}
-
-/* Degenerate: let the active set finish what the interior point began, or else return to where that ended. */
-static int finish(workspace_t *work, const data_t *data, command_t *command, point_t *point, int32_t *iterations)
-{
-    int32_t more = 0;
-    int certified;
-    real force[N], lambda[V];
-    (void)memcpy(force, work->force, sizeof force);
-    (void)memcpy(lambda, work->lambda, sizeof lambda);
-    certified = NAME(active_set)(work, data, command, point, &more);
-    *iterations += more;
-    if (!certified) {
-        (void)memcpy(work->force, force, sizeof force);
-        (void)memcpy(work->lambda, lambda, sizeof lambda);
-        work->warm = 0;
-        NAME(evaluate)(data, command, work->force, work->lambda, point);
     }
     return certified;
 }
@@ -220,9 +201,6 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
         result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
         command.floor = NAME(floor_of)(data, &command);
         certified = NAME(interior_point)(work, data, &command, &point, &result->interior_point_iterations);
-        if (!certified && follow != 0) {
-            certified = finish(work, data, &command, &point, &result->active_set_iterations);
-        }
     }
     if (!(point.gap <= (real)CLOSE * point.phi) && point.gap > 0) {
         certified = refine(work, data, &command, &point, &result->interior_point_iterations);

@@ -26,11 +26,9 @@
 #include "gnc_allocate_internal.h"
 
 enum {
-    MAX_PIECES = 28 + N,
+    MAX_ROUNDS = 32 + N, /* pieces, block steps and exchanges in all */
     BLOCK_STEPS = 6, /* steps that change all offenders at once */
-    MAX_STUCK = 6,   /* pieces of no length in a row: many obstacles at one point */
-    WARM_WORK = 4,   /* what may be done from the last answer: a step costs one, with an obstacle two, short of half way all */
-    COLD_WORK = WARM_WORK * (MAX_PIECES + 1) /* no limit but that of pieces */
+    MAX_STUCK = 6    /* pieces of no length in a row: many obstacles at one point */
 };
 #define OPENING (real)0.01 /* room that open_up gives, of the box, the largest gradient, the worst q_v */
 #define SMALL (real)0.01   /* of the tolerance: a multiplier or slack this wrong does not show in the gap */
@@ -46,7 +44,9 @@ typedef struct {
     int smooth;      /* 1: no set has changed */
     int stuck;       /* pieces of no length so far in a row */
     int block_steps; /* steps that may change all offenders at once */
-    int work_left;   /* in units of WARM_WORK */
+    int budget;      /* what is left of it */
+    int exchanges;   /* of dependent vertices in a row, without a move */
+    int dropped;     /* what the last of them dropped: an actuator came free, or a vertex (from N on) left */
     real last_gap;   /* gap before the last step if that was a full one, else -1 */
 } path_t;
 
@@ -245,14 +245,16 @@ static int change_all_bounds(workspace_t *work, const goal_t *goal, const comman
 
 /* Take the state over from the last sample, or start cold, and look ahead. */
 static void begin(path_t *path, real *force, real *lambda, workspace_t *work, const data_t *data,
-                  const command_t *command)
+                  const command_t *command, int budget)
 {
     int i;
     path->newcomer = NOTHING;
     path->smooth = work->warm;
     path->stuck = 0;
     path->block_steps = work->warm != 0 && data->distinct > 1 ? 0 : BLOCK_STEPS;
-    path->work_left = work->warm != 0 ? WARM_WORK : COLD_WORK;
+    path->budget = budget;
+    path->exchanges = 0;
+    path->dropped = NOTHING;
     path->last_gap = -1;
     if (work->warm == 0) {
         start_cold(work, data, command);
@@ -309,7 +311,7 @@ static int block_step(path_t *path, workspace_t *work, const data_t *data, const
         !NAME(newton_goal)(&goal, &vert, work, data, command, point)) {
         return 0;
     }
-    path->work_left -= 1;
+    path->budget -= 1;
     if (change_all_bounds(work, &goal, command) != 0) {
         path->smooth = 0;
     } else {
@@ -318,16 +320,31 @@ static int block_step(path_t *path, workspace_t *work, const data_t *data, const
     return 1;
 }
 
-/* One piece of the path: to the goal, or to the first obstacle, which changes sets. */
+/* One piece of the path: to the goal, or to the first obstacle, which changes sets. Where the active vertices depend on
+ * each other, exchange one instead, and let the next round look again: each exchange takes a vertex or a bound away. */
 static int piece(path_t *path, workspace_t *work, const data_t *data, const command_t *command, point_t *point)
 {
     goal_t goal;
     vertices_t vert;
     real clear;
-    int obstacle;
-    const int slow = path->last_gap > 0 && point->gap > (real)0.01 * path->last_gap;
-    if (!NAME(independent_vertices)(&vert, work, data, command, point, path->newcomer, slow) ||
-        !NAME(newton_goal)(&goal, &vert, work, data, command, point)) {
+    int obstacle, dependent;
+    const int slow = path->exchanges == 0 && path->last_gap > 0 && point->gap > (real)0.01 * path->last_gap;
+    if (path->dropped < N && !NAME(refresh_factors)(work, data, slow)) {
+        return 0;
+    }
+    dependent = NAME(factor_vertices)(&vert, work, data, point);
+    path->exchanges = dependent != 0 ? path->exchanges + 1 : 0;
+    if (path->exchanges != 0) {
+        path->budget -= 1;
+        if (dependent > 0 && path->exchanges <= V) {
+            path->dropped = NAME(exchange)(work, &vert, data, command, point, dependent, path->newcomer);
+        } else {
+            path->dropped = NOTHING;
+        }
+        return path->dropped != NOTHING;
+    }
+    path->dropped = NOTHING;
+    if (!NAME(newton_goal)(&goal, &vert, work, data, command, point)) {
         return 0;
     }
     obstacle = first_obstacle(&clear, &goal, work, data, command, point);
@@ -335,7 +352,7 @@ static int piece(path_t *path, workspace_t *work, const data_t *data, const comm
     path->last_gap = obstacle == NOTHING ? point->gap : -1;
     path->stuck = clear > (real)1e-6 ? 0 : path->stuck + 1;
     path->newcomer = NOTHING;
-    path->work_left -= obstacle == NOTHING ? 1 : clear < (real)0.5 ? WARM_WORK : 2;
+    path->budget -= obstacle == NOTHING ? 1 : clear < (real)0.5 ? WARM_WORK : 2;
     if (obstacle != NOTHING) {
         const int joins = obstacle < N ? work->side[obstacle] == 0 : work->active[obstacle - N] == 0;
         path->smooth = 0;
@@ -350,20 +367,23 @@ static int piece(path_t *path, workspace_t *work, const data_t *data, const comm
 }
 
 int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
-                     int32_t *iterations)
+                     int budget, int32_t *iterations)
 {
     int i, v, k, going = 1, arrived = 0;
     real force[N], lambda[V]; /* where the path began */
     path_t path;
-    begin(&path, force, lambda, work, data, command);
-    for (k = 0; k <= MAX_PIECES && going; ++k) {
-        NAME(evaluate)(data, command, work->force, work->lambda, point);
-        *iterations = k;
-        arrived = is_there(&path, work, data, command, point);
-        going = !arrived && path.work_left > 0 && GNC_ASSERT(is_finite(point->gap));
+    begin(&path, force, lambda, work, data, command, budget);
+    *iterations = 0;
+    for (k = 0; k <= MAX_ROUNDS && going; ++k) {
+        if (path.exchanges == 0) {
+            NAME(evaluate)(data, command, work->force, work->lambda, point);
+            arrived = is_there(&path, work, data, command, point);
+            *iterations = k;
+        }
+        going = !arrived && path.budget > 0 && GNC_ASSERT(is_finite(point->gap));
         if (going && k < path.block_steps) {
             going = block_step(&path, work, data, command, point);
-        } else if (going && k < MAX_PIECES) {
+        } else if (going && k < MAX_ROUNDS) {
             going = piece(&path, work, data, command, point);
         } else {
             continue; /* the end, by one count or the other */

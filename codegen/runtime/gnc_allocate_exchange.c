@@ -99,10 +99,10 @@ static int goes_backwards(const real *n, const real *rate, const workspace_t *wo
     return backwards;
 }
 
-/* Make the active vertices independent up to place `last` of the list: shift weight along the mixture, the
- * way that the newcomer wants, and drop what is used up. Return that, NOTHING if rounding hides it. */
-static int exchange(workspace_t *work, const vertices_t *vert, const data_t *data,
-                    const command_t *command, point_t *point, int last, int newcomer)
+/* The vertex at place `last` of the list depends on those before it: shift weight along the mixture, the way that the
+ * newcomer wants, and drop what is used up, a vertex or a bound. Return that, NOTHING if rounding hides it. */
+int NAME(exchange)(workspace_t *work, const vertices_t *vert, const data_t *data,
+                   const command_t *command, point_t *point, int last, int newcomer)
 {
     int a, i, k, back, drop, drop_back;
     real n[A], rate[N], zeta[K] = {0}, reach, reach_back, step;
@@ -133,22 +133,4 @@ static int exchange(workspace_t *work, const vertices_t *vert, const data_t *dat
     }
     NAME(change_set)(work, drop, 0);
     return drop;
-}
-
-int NAME(independent_vertices)(vertices_t *vert, workspace_t *work, const data_t *data,
-                               const command_t *command, point_t *point, int newcomer, int always)
-{
-    int k, going = NAME(refresh_factors)(work, data, always), dependent = 1;
-    for (k = 0; k <= V && going; ++k) { /* each exchange takes a vertex or a bound away */
-        dependent = NAME(factor_vertices)(vert, work, data, point);
-        going = dependent > 0;
-        if (going != 0) {
-            const int dropped = exchange(work, vert, data, command, point, dependent, newcomer);
-            going = dropped != NOTHING;
-            if (going && dropped < N) {
-                going = NAME(refresh_factors)(work, data, 0); /* an actuator came free */
-            }
-        }
-    }
-    return dependent == 0;
 }

@@ -13,7 +13,7 @@
  */
 #include "gnc_allocate_internal.h"
 
-enum { MAX_STEPS = 30, MAX_CAREFUL_STEPS = 60 };
+enum { MAX_STEPS = 26, MAX_CAREFUL_STEPS = 34 };
 #define SHORT_STEP (real)0.1 /* a step this short did not pay: centre instead */
 #define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
                               * easy problems and loses the way in degenerate ones */

@@ -41,7 +41,9 @@ enum {
     KT = GNC_ALLOC_TRIANGLE(GNC_ALLOC_K),   /* entries of a lower triangle, packed by rows */
     A = K + 2,                              /* more active vertices are always dependent */
     READY = 0x5EA1,                         /* mark of data that the set-up has filled */
-    NOTHING = -1                            /* no obstacle; else actuator i is i and vertex v is N + v */
+    NOTHING = -1,                           /* no obstacle; else actuator i is i and vertex v is N + v */
+    WARM_WORK = 4, /* from the last answer: a step costs one, with an obstacle two, short of half way all */
+    COLD_WORK = 1000 /* no limit but that of rounds */
 };
 
 #define NAME(word) GNC_ALLOC_NAME(word)
@@ -196,18 +198,17 @@ int NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *
 int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *target,
                              const data_t *data, const iterate_t *it, const point_t *point);
 
-/* gnc_allocate_exchange.c: bring the factors up to date after exchanging vertices until the active ones are
- * independent. Return 0 where rounding hides which ones are. */
-int NAME(independent_vertices)(vertices_t *vert, workspace_t *work, const data_t *data,
-                               const command_t *command, point_t *point, int newcomer, int always);
+/* gnc_allocate_exchange.c: make dependent vertices fewer by one, or free an actuator; return what was dropped. */
+int NAME(exchange)(workspace_t *work, const vertices_t *vert, const data_t *data,
+                   const command_t *command, point_t *point, int last, int newcomer);
 void NAME(change_set)(workspace_t *work, int which, int upwards);
 
 /* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: return 1 if the answer in the workspace
- * is certified; the point belongs to that answer. */
+ * is certified; the point belongs to that answer. The budget is WARM_WORK or COLD_WORK. */
 int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t *command,
                          point_t *point, int32_t *iterations);
 int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
-                     int32_t *iterations);
+                     int budget, int32_t *iterations);
 
 /* ---- small dense algebra: lower triangles, inverse diagonals ---------------------------------- */
 
