@@ -161,3 +161,19 @@ def join(values: Values, a: Value, narrowed_a: Narrowed, b: Value, narrowed_b: N
     """Return what is known of a word that is a on one way and b on another."""
     (low, high), (low_b, high_b) = values.limits(a, narrowed_a), values.limits(b, narrowed_b)
     return values.fresh(min(low, low_b), max(high, high_b))
+
+
+def logic(name: str, a: Value, b: Value, values: Values, narrowed: Narrowed) -> Value:
+    """Return and, orr, orn, eor or bic of two words."""
+    if isinstance(a, int) and isinstance(b, int):
+        return word({"and": a & b, "orr": a | b, "orn": a | ~b, "eor": a ^ b, "bic": a & ~b}[name])
+    mask = b if isinstance(b, int) else a
+    if name == "and" and isinstance(mask, int) and mask >= 0:
+        return values.fresh(0, mask)
+    low, high = values.limits(a, narrowed)
+    if name == "bic" and low >= 0:
+        return values.fresh(0, high)
+    if name == "orr" and low >= 0 and values.limits(b, narrowed)[0] >= 0:
+        top = max(high, values.limits(b, narrowed)[1])
+        return values.fresh(low, (1 << top.bit_length()) - 1)
+    return values.fresh()

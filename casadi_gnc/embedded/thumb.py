@@ -315,3 +315,34 @@ def _body(head: int, latch: int, before: dict[int, list[int]]) -> set[int]:
             found.update(new)
             todo += new
     return found
+
+
+@functools.cache
+def kind_of(name: str) -> str:
+    """Return the mnemonic of an instruction on reals without its types."""
+    return name.split(".")[0]
+
+
+def is_shift(text: str, count: int, most: int) -> bool:
+    """Tell whether the last of `most` arguments is the shift of the one before."""
+    return count == most and text.split(" ")[0] in ("lsl", "lsr", "asr", "ror")
+
+
+def names_three(given: tuple[str, ...]) -> bool:
+    """Tell whether an instruction names a target and two operands."""
+    return len(given) >= 3 and not is_shift(given[2], 3, 3)
+
+
+def listed(text: str) -> list[int]:
+    """Return the registers of `{r4, r5-r7, pc}`."""
+    found: list[int] = []
+    for part in text.strip("{}^").split(","):
+        first, _, last = part.strip().partition("-")
+        found += range(register(first), register(last or first) + 1)
+    return found
+
+
+def span_of(text: str) -> int:
+    """Return how many registers d8-d12 are."""
+    first, _, last = text.partition("-")
+    return int((last or first)[1:]) - int(first[1:]) + 1

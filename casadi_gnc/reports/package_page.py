@@ -11,6 +11,8 @@ _TARGET = (
     ("title", "target", "name"),
     ("instructions_median", "instructions a step, median", "number"),
     ("instructions_worst", "worst", "number"),
+    ("instructions_climbed", "dearest sought", "number"),
+    ("instructions_bound", "no step above", "number"),
     ("instructions_first", "first", "number"),
     ("instructions_init", "init", "number"),
     ("text_bytes", "code [B]", "number"),
@@ -117,5 +119,5 @@ def _signals(one: dict[str, Any]) -> dict[str, Any]:
 def _targets(found: dict[str, Any]) -> dict[str, Any] | None:
     if not found["targets"]:
         return None
-    rows = [[str(row[key]) for key, _, _ in _TARGET] for row in found["targets"]]
+    rows = [["-" if row[key] is None else str(row[key]) for key, _, _ in _TARGET] for row in found["targets"]]
     return {"columns": [(label, kind) for _, label, kind in _TARGET], "rows": rows}

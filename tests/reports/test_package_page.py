@@ -10,6 +10,7 @@ from casadi_gnc.reports.package_page import of_verification
 SIGNAL = {"signal": "force", "unit": "N", "count": 12288, "words": 0, "ulp": 0.0, "absolute": 0.0, "relative": 0.0}
 TARGET = {
     "title": "Cortex-M7", "compiler": "gcc 12", "instructions_median": 4321, "instructions_worst": 5000,
+    "instructions_climbed": 5100, "instructions_bound": 6000,
     "instructions_first": 4400, "instructions_init": 900, "text_bytes": 7000, "data_bytes": 0, "bss_bytes": 8,
     "stack_step_bytes": 640, "stack_step_bound_bytes": 704, "state_bytes": 96, "params_bytes": 32,
 }  # fmt: skip
