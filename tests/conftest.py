@@ -36,6 +36,10 @@ def _importable(module: str) -> bool:
         return False
 
 
+#: What needs a package of the extra `oracles` to be looked through for examples.
+collect_ignore = [] if _importable("jax") else ["bench/jax_flight.py"]
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20200106)

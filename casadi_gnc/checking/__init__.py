@@ -40,7 +40,7 @@ def check(mission: Mission, scheme: str | Sequence[str] | None = None) -> list[C
     >>> import casadi_gnc
     >>> found = casadi_gnc.check(casadi_gnc.load("huang2020/slew_as_printed"), "funnel_pinv")
     >>> [each.name for each in found if each.verdict == "fail"]
-    ['funnel.floor.mrp', 'gains.anti_windup', 'sampling.closed_loop']
+    ['funnel.floor.mrp', 'settling.settling_time', 'gains.anti_windup', 'sampling.closed_loop']
     """
     names = [scheme] if isinstance(scheme, str) else scheme
     chosen = mission.schemes if names is None else tuple(mission.scheme(name) for name in names)

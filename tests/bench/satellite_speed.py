@@ -17,8 +17,9 @@ from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
 
-DURATION = float(sys.argv[1]) if len(sys.argv) > 1 else 6000.0
-COULOMB = float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
+ASKED = sys.argv[1:] if __name__ == "__main__" else []
+DURATION = float(ASKED[0]) if ASKED else 6000.0
+COULOMB = float(ASKED[1]) if len(ASKED) > 1 else 0.0
 GAINS = {"attitude_gain": 4.0, "rate_gain": 18.0}
 RUNS = 5
 

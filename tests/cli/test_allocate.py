@@ -70,6 +70,7 @@ def test_back_ends_agree(commands, tmp_path):
     assert np.allclose(*costs, rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_ten_thousand_lines_stream_in_order():
     u = 1e-3 * np.sin(np.arange(10_000)[:, None] * np.array([0.001, 0.002, 0.003]))
     given = "".join(f"{a!r},{b!r},{c!r}\n" for a, b, c in u.tolist())
@@ -170,6 +171,7 @@ def told(done: subprocess.CompletedProcess, message: str) -> None:
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_bad_input_is_told(commands, tmp_path):
     path, _ = commands
     bad = tmp_path / "bad.csv"

@@ -10,6 +10,8 @@ import pytest
 
 from casadi_gnc.benchmarks.summary import COLUMNS
 
+pytestmark = pytest.mark.slow  # the functions behind the command have tests of their own
+
 SMALL = (
     "plain/coils_4",
     "robust/thrusters_6_1cm",

@@ -9,6 +9,8 @@ import pytest
 
 from casadi_gnc.system import assets
 
+pytestmark = pytest.mark.slow  # the functions behind the command have tests of their own
+
 CASE = (assets.folder("problems") / "tao2019" / "case1.toml").read_text(encoding="utf-8")
 SWEEP = """
 [[sweep]]

@@ -18,6 +18,7 @@ def command(*words, **environment):
     )
 
 
+@pytest.mark.slow
 def test_generate_make_verify(tmp_path):
     folder = tmp_path / "flight"
     done = command(
@@ -111,6 +112,7 @@ def test_bad_input_is_one_sentence(words, sentence, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_host_alone_says_what_is_missing(tmp_path):
     """A path with a host compiler and nothing else: the words of the host, and the names of what is not there."""
     import shutil
@@ -131,6 +133,7 @@ def test_missing_target_is_one_sentence(tmp_path):
     assert "make targets" in done.stderr
 
 
+@pytest.mark.slow
 def test_texts_of_strangers_do_not_reach_the_terminal(tmp_path):
     """A package's manifest comes with the package, and may have been written by anybody."""
     folder = copied(made("huang2020/slew", "pd_pinv"), tmp_path)

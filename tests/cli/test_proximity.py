@@ -9,6 +9,8 @@ import pytest
 
 from casadi_gnc.problem_files.document import read
 
+pytestmark = pytest.mark.slow  # the functions behind the command have tests of their own
+
 PRINTED = read("sun2018/as_printed").text
 LOW = read("sun2018/circular_orbit").text
 

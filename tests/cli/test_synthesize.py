@@ -53,7 +53,7 @@ def test_repaired_synthesis_is_certified():
         assert (np.linalg.eigvals(loop(r)).real.max() < 0) == stable
 
 
-@pytest.mark.parametrize("backend", ["clarabel", "barrier"])
+@pytest.mark.parametrize("backend", ["clarabel", pytest.param("barrier", marks=pytest.mark.slow)])
 def test_printed_theorem_is_infeasible_and_named(backend):
     done = run("shi2020/as_printed", "--json", "--backend", backend)
     assert done.returncode == 1
@@ -124,6 +124,7 @@ def test_a_search_ends_at_its_time_limit(tmp_path):
     assert not found["gains"]
 
 
+@pytest.mark.slow
 def test_other_recipes_run_from_files(tmp_path):
     path = tmp_path / "feedback.toml"
     path.write_text(STATE_FEEDBACK)

@@ -31,7 +31,14 @@ def kinds():
     return sorted(found.values())
 
 
-@pytest.mark.parametrize(("problem", "scheme"), kinds())
+#: One of each way of allocating; the others are slow.
+QUICK = ("huang2020/slew", "shi2020/docking", "tao2019/case1")
+
+
+@pytest.mark.parametrize(
+    ("problem", "scheme"),
+    [kind if kind[0] in QUICK else pytest.param(*kind, marks=pytest.mark.slow) for kind in kinds()],
+)
 def test_every_kind_of_controller(problem, scheme, tmp_path):
     """Float and double in closed loop; double with the C library's functions against the virtual machine."""
     mission = sampled(casadi_gnc.load(problem))

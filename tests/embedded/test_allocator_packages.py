@@ -80,6 +80,7 @@ def test_words_are_those_of_the_python_back_end_and_faults_keep_the_certificate(
     assert (np.abs(outputs[100:164, :count] - outputs[:64, :count]).max(axis=1) > 0.01).mean() > 0.5
 
 
+@pytest.mark.slow
 def test_the_package_builds_strictly_and_is_sound(package, tmp_path):
     for unit in units(package):
         assert not run("gcc", *C99, *STRICT, "-c", unit, "-o", tmp_path / "unit.o").stderr

@@ -79,6 +79,7 @@ def test_header_and_readme_say_names_shapes_units_and_the_period(package):
     assert f'#define LAW_IDENTITY "law {kept[:16]} double"' in header
 
 
+@pytest.mark.slow
 def test_verification_rebuilds_the_saved_function_and_demands_the_shipped_words(package, tmp_path):
     found = gnc.verify(package)
     assert found["is_sound"]

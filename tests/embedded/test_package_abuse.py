@@ -183,13 +183,17 @@ LAWS = [
     ("tao2019/case1", "funnels", "float64", 1_000_000),
     ("huang2020/slew", "funnel_robust", "float64", 20_000),
     ("huang2020/slew", "funnel_robust", "float32", 5_000),
+    ("satellites/earth_pointing", "mrp", "float64", 100_000),
+    ("satellites/slew_and_track", "eigenaxis", "float64", 100_000),
+    ("satellites/detumble_bdot", "bdot", "float64", 100_000),
+    ("satellites/safe_mode", "modes", "float64", 100_000),
 ]
-#: Parts of the steps: a twentieth is fast, but for the robust allocator, which takes long to compile.
+#: Parts of the steps: a twentieth is fast, but where it takes long to compile.
 RUNS = [
     pytest.param(law, part, marks=pytest.mark.slow if part == 1 else (), id="-".join(law[:3]) + f"-1/{part}")
     for law in LAWS
     for part in (1, 20)
-    if part == 1 or law[1] != "funnel_robust"
+    if part == 1 or not (law[1] == "funnel_robust" or law[0].startswith("satellites/"))
 ]
 
 

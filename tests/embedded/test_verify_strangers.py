@@ -118,6 +118,7 @@ def test_vectors_that_show_nothing(folder):
     assert not told["is_sound"]
 
 
+@pytest.mark.slow
 def test_text_that_this_version_does_not_write(folder):
     (folder / "Makefile").write_text((folder / "Makefile").read_text() + "\ntest: evil\nevil:\n\techo evil\n")
     told = verify(signed(folder))

@@ -152,6 +152,7 @@ def test_an_answer_of_another_form_is_none(kept, tmp_path):
     assert answering._remembered(tmp_path / "a.json") is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [b"\xff\xfe", b'{"values": {"other": 5.0}}'])
 def test_an_answer_that_is_not_as_it_was_kept_is_found_anew(kept, tmp_path, monkeypatch):
     monkeypatch.setenv("CASADI_GNC_CACHE", str(tmp_path))

@@ -157,6 +157,7 @@ def test_one_text_is_one_class_and_another_text_another(tmp_path):
     assert first.truth.coupling == 0.8
 
 
+@pytest.mark.slow
 def test_a_package_tells_that_its_code_was_changed(tmp_path):
     package = tmp_path / "package"
     gnc.generate(folder_with(tmp_path), package, steps=40)

@@ -428,6 +428,7 @@ def test_command_says_what_a_law_refuses(tmp_path):
     assert found["sampling.closed_loop"]["value"] == pytest.approx(7.8, abs=0.05)
 
 
+@pytest.mark.slow
 def test_command_reads_a_synthesis_and_names_what_cannot_be_met():
     told = command("shi2020/as_printed")
     assert told.returncode == 1
@@ -435,6 +436,7 @@ def test_command_reads_a_synthesis_and_names_what_cannot_be_met():
     assert command("shi2020/synthesis").returncode == 0
 
 
+@pytest.mark.slow
 def test_command_refuses_what_it_cannot_check(tmp_path):
     told = command("huang2020/allocation")
     assert (told.returncode, told.stdout) == (2, "")

@@ -111,7 +111,7 @@ def test_shipped_problems_load(name):
     elif kind == "mission":
         mission = casadi_gnc.load(name, strict=False)
         assert mission.title
-        assert "doi" in mission.source
+        assert "doi" in mission.source or name.startswith("satellites/")
         assert mission.craft.panels(mission)
     else:
         assert kind in ("claims", "benchmark"), kind  # read by the rooms above this one

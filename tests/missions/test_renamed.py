@@ -10,7 +10,12 @@ from casadi_gnc.problem_files.document import read, shipped
 MISSIONS = [name for name in shipped() if read(name).data["kind"] == "mission"]
 
 
-@pytest.mark.parametrize("name", MISSIONS)
+QUICK = ("huang2020/detumble", "huang2019/nominal", "shi2020/docking")
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in MISSIONS]
+)
 def test_renamed_schemes_are_checked_alike(name):
     mission = casadi_gnc.load(name, strict=False)
     scheme = mission.schemes[-1]

@@ -83,6 +83,7 @@ def test_ten_thousand_points_are_few_bytes(made, tmp_path):
     assert str(chart).count("h0") > 2000
 
 
+@pytest.mark.slow
 def test_commands_write_it(tmp_path):
     (tmp_path / "m.toml").write_text(
         casadi_gnc.load("huang2020/detumble").origin.text.replace("duration_s = 1500.0", "duration_s = 20.0")

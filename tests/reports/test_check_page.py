@@ -48,6 +48,7 @@ def test_what_schemes_share_stands_once(page, found):
     assert shell(page).count("geometry.effectiveness") == 1
 
 
+@pytest.mark.slow
 def test_commands_write_it(tmp_path):
     command = [sys.executable, "-m", "casadi_gnc.cli.main"]
     for words in (["check", "shi2020/synthesis", "--report"], ["report", "shi2020/synthesis", "--out"]):

@@ -223,6 +223,7 @@ def found(mission, *asked, scheme=None):
     return {one.name.split(".")[1]: one for one in checks if one.name.startswith("requirement.")}
 
 
+@pytest.mark.slow
 def test_check_says_what_the_start_decides(detumble):
     start = np.array(detumble.start)[detumble.truth.state.place("rate")]
     norm = float(np.linalg.norm(start))
