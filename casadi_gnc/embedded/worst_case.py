@@ -23,8 +23,10 @@ from casadi_gnc.errors import TargetError
 
 #: Address that ends the call.
 _BACK = 0x7FFF0000
-#: Instructions after which the search gives up: some loop has no bound.
-_PATIENCE = 30_000_000
+#: Work after which the search gives up, in instructions: a loop without a bound, or ways that know too much to join.
+_PATIENCE = 24_000_000
+#: Places in memory that two states know are joined at so many for the work of an instruction.
+_JOINED = 1
 
 
 class _Ways:
@@ -109,6 +111,15 @@ class Counter(Processor):
         state.registers[13], state.registers[14] = STACK, _BACK
         return self._call(self._by_name[name], state)
 
+    def _spend(self, work: int) -> None:
+        self._left -= work
+        if self._left < 0:
+            raise TargetError("its text has a loop without a bound that shows, or more ways than can be followed")
+
+    def _merge(self, a: State, b: State) -> State:
+        self._spend(len(a.memory) // _JOINED)
+        return super()._merge(a, b)
+
     # ---- control --------------------------------------------------------------------------------------
 
     def _call(self, function: Function, state: State) -> int:
@@ -141,9 +152,7 @@ class Counter(Processor):
             if one is None:
                 raise TargetError(f"{function.name} leads to no instruction at {at:x}")
             cost += 1
-            self._left -= 1
-            if self._left < 0:
-                raise TargetError(f"{function.name} has a loop without a bound that the compiled text shows")
+            self._spend(1)
             if one.name in ("b", "cbz", "cbnz") or (one.is_return and one.condition):
                 taken = self._decide(one, state)
                 for way in (True, False) if taken is None else (taken,):

@@ -153,7 +153,7 @@ def one_of_all() -> ca.Function:
     return ca.Function("all", [x, a, c], [ca.if_else(ca.fabs(one) <= 1e6, one, 0) for one in results])
 
 
-@pytest.mark.slow
+@pytest.mark.long  # the search for a bound of its step goes on to its end, on each board
 @pytest.mark.parametrize("real", ["float64", "float32"])
 @needs_target("cortex-m4f")
 @needs_target("cortex-m7")
