@@ -268,7 +268,8 @@ def _read(
     rest = raw[8 * (_NUMBERS + steps) :]
     word = np.dtype(np.uint64 if len(rest) == 8 * steps * outputs else np.uint32)
     words = np.frombuffer(rest, word).reshape(steps, outputs)
+    dearest = (climbed[0] - int(empty), climbed[1]) if climbed else None
     return Measured(
         words, counts - empty, int(init - empty), int(step_stack), int(init_stack),
-        bound, most, climbed, int(state), int(params), text, data, bss, compiler,
+        bound, most, dearest, int(state), int(params), text, data, bss, compiler,
     )  # fmt: skip
