@@ -35,6 +35,7 @@ FLOORS = {
     "problem_files": 8,
     "reports": 9,
     "delivery": 9,
+    "tuning": 9,
     "benchmarks": 10,
     "fidelity": 10,
     "starters": 10,

@@ -1,0 +1,6 @@
+"""Search among flights: what makes a mission fail, in standard units of what its file disperses."""
+
+from casadi_gnc.tuning.objective import Objective
+from casadi_gnc.tuning.space import Space
+
+__all__ = ["Objective", "Space"]
