@@ -2,17 +2,6 @@
 
 What varies is told as dispersions are (`casadi_gnc.campaigns.DispersionTable`): any key that a campaign may disperse,
 any gain, the start. Points are in standard units (`casadi_gnc.tuning.space`).
-
-Examples
---------
->>> import casadi_gnc as gnc
->>> from casadi_gnc.campaigns import DispersionTable
->>> mission = gnc.load("huang2020/detumble").with_timing(duration=20.0)
->>> gain = DispersionTable(key="scheme.damping_pinv.law.rate_gain", uniform=[0.1, 0.3])
->>> slow = gnc.Requirement("SLOW", formula="always[10, 20](norm(rate) <= 0.1)")
->>> rate = Objective(mission, "damping_pinv", parameters=[gain], what=slow)
->>> bool(rate.values([[1.0]])[0] > rate.values([[-1.0]])[0]), rate.flights
-(True, 2)
 """
 
 from __future__ import annotations
