@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from casadi_gnc.signals import Layout, Signal
     from casadi_gnc.status import StepStatus
     from casadi_gnc.tables.part import Part, table
+    from casadi_gnc.tuning.falsifying import falsify
 
 #: Where each name lives.
 _HOMES = {
@@ -66,6 +67,7 @@ _HOMES = {
     "Verdict": "missions.requirements",
     "campaign": "problem_files.by_name",
     "check": "problem_files.by_name",
+    "falsify": "tuning.falsifying",
     "fly": "problem_files.by_name",
     "fly_all": "problem_files.by_name",
     "gain": "laws",
@@ -108,6 +110,7 @@ __all__ = [
     "Verdict",
     "campaign",
     "check",
+    "falsify",
     "fly",
     "fly_all",
     "gain",

@@ -20,6 +20,7 @@ from casadi_gnc.cli import (
     check,
     demo,
     doctor,
+    falsify,
     fly,
     generate,
     margins,
@@ -63,6 +64,7 @@ app = typer.Typer(
 app.command("demo")(demo.demo)
 app.command("fly")(_about_its_file(fly.fly))
 app.command("campaign")(campaign.campaign)
+app.command("falsify")(_about_its_file(falsify.falsify))
 app.command("check")(check.check)
 app.command("margins")(_about_its_file(margins.margins))
 app.command("allocate")(_about_its_file(allocate.allocate))

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -111,31 +111,14 @@ class Objective:
         return rows_of(self.cases, drawn, good, flown, margins)
 
     def gradient(self, point: Any, step: float = STEP) -> np.ndarray:
-        """Return the slope at a point by differences, (p,), 2 p flights side by side; NaN where a flight has no number.
-
-        Differences are central, and of one side at the end of a coordinate. A choice has no slope: 0. Coordinates
-        that are NaN stay the file's, with slope 0.
+        """Return the slope at a point by central differences, (p,), 2 p flights side by side; as `differences`.
 
         Parameters
         ----------
         point : (p,), in standard units.
         step : in standard units.
         """
-        point = np.asarray(point, dtype=float)
-        moved = np.flatnonzero(~(self.space.discrete | np.isnan(point)))
-        ahead = np.tile(point, (len(moved), 1))
-        behind = ahead.copy()
-        ahead[range(len(moved)), moved] = np.minimum(point[moved] + step, self.space.high[moved])
-        behind[range(len(moved)), moved] = np.maximum(point[moved] - step, self.space.low[moved])
-        found = np.zeros(self.size)
-        if not len(moved):
-            return found
-        told = self.values(np.vstack([ahead, behind]))
-        apart = (ahead - behind)[range(len(moved)), moved]
-        with np.errstate(invalid="ignore"):  # the difference of two numbers without end is none
-            slope = (told[: len(moved)] - told[len(moved) :]) / apart
-        found[moved] = np.where(np.isfinite(slope), slope, math.nan)
-        return found
+        return differences(self.space, self.values, point, step)
 
     def _told(self, table: Columns) -> np.ndarray:
         found = np.asarray(table[self.column], dtype=float)
@@ -157,3 +140,45 @@ def _column(mission: Mission, name: str) -> str:
     raise CampaignError(
         f"the mission has no requirement and no metric {name!r}; there is {', '.join([*ids, *metrics]) or 'none'}"
     )
+
+
+def differences(
+    space: Space,
+    values: Callable[[np.ndarray], np.ndarray],
+    point: Any,
+    step: float = STEP,
+    value: float | None = None,
+) -> np.ndarray:
+    """Return the slope of a number of flights at a point, (p,); NaN where a flight has no number.
+
+    A choice has no slope: 0. A coordinate that is NaN stays the file's, with slope 0.
+
+    Parameters
+    ----------
+    space : of the points.
+    values : from points, (n, p), to numbers, (n,).
+    point : (p,), in standard units.
+    step : in standard units.
+    value : the number at the point; where it is given, p differences of one side, else 2 p flights. At the end of a
+        coordinate a difference is of one side.
+    """
+    point = np.asarray(point, dtype=float)
+    moved = np.flatnonzero(~(space.discrete | np.isnan(point)))
+    found = np.zeros(space.size)
+    if not len(moved):
+        return found
+    places = np.arange(len(moved))
+    ahead = np.tile(point, (len(moved), 1))
+    behind = ahead.copy()
+    if value is None:
+        ahead[places, moved] = np.minimum(point[moved] + step, space.high[moved])
+        behind[places, moved] = np.maximum(point[moved] - step, space.low[moved])
+        told = values(np.vstack([ahead, behind]))
+        above, below = told[: len(moved)], told[len(moved) :]
+    else:  # away from the nearer end
+        ahead[places, moved] += np.where(point[moved] + step > space.high[moved], -step, step)
+        above, below = values(ahead), np.full(len(moved), value)
+    with np.errstate(invalid="ignore"):  # the difference of two numbers without end is none
+        slope = (above - below) / (ahead - behind)[places, moved]
+    found[moved] = np.where(np.isfinite(slope), slope, math.nan)
+    return found

@@ -1,0 +1,154 @@
+"""The flights of a search: of several builds, remembered, counted, within a budget."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from casadi_gnc.errors import GncError
+from casadi_gnc.tuning.journal import Journal
+from casadi_gnc.tuning.objective import Objective, differences
+from casadi_gnc.tuning.space import Space
+
+#: Called as told(flights, flights at most).
+Told = Callable[[int, int], None]
+
+
+class SpentError(Exception):
+    """End a search whose budget does not allow the next flights; never seen outside of it."""
+
+
+@dataclass(eq=False)
+class Build:
+    """Hold a mission that a search flies.
+
+    Parameters
+    ----------
+    make : returns what flies it, when it is first flown.
+    changes : of the file, by path.
+    """
+
+    make: Callable[[], Objective]
+    changes: dict[str, Any] = field(default_factory=dict)
+    #: Why it cannot fly, "" where it can or was not asked yet.
+    why: str = ""
+    _made: Objective | None = None
+
+    @property
+    def objective(self) -> Objective:
+        """What flies it; raise `GncError` where it cannot fly."""
+        if self._made is None:
+            self._made = self.make()
+        return self._made
+
+    def at(self, rows: np.ndarray) -> np.ndarray:
+        """Return the numbers of flights, (n,), NaN where there are none."""
+        if not self.why:
+            try:
+                return self.objective.at(rows)
+            except GncError as error:
+                if self._made is not None:
+                    raise
+                self.why = str(error)
+        return np.full(len(rows), math.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Hold a flight: of which build, at which point, (p,), and its number."""
+
+    of: int
+    point: np.ndarray
+    value: float
+
+    @property
+    def broken(self) -> bool:
+        """Whether the requirement is not met."""
+        return self.value < 0
+
+
+@dataclass(frozen=True)
+class Step:
+    """Tell where a search was: what it did, after how many flights, the robustness, and how far from the nominal."""
+
+    did: str
+    flights: int
+    robustness: float
+    distance: float
+
+
+class Flights:
+    """Fly points of a search.
+
+    Parameters
+    ----------
+    builds : at least one; the first is the mission as it is.
+    space : of the points, the same of all builds.
+    journal : of what was flown.
+    most : flights at most.
+    told : called as flights are done.
+    """
+
+    def __init__(
+        self, builds: Sequence[Build], space: Space, journal: Journal, most: int, told: Told | None = None
+    ) -> None:
+        self.builds, self.space, self.most = tuple(builds), space, most
+        self._journal, self._told = journal, told
+        self._asked: set[tuple[int, bytes]] = set()
+        #: Flights of this process; the rest were in the journal.
+        self.flown = 0
+        #: The flight of the smallest number so far.
+        self.lowest: Trial | None = None
+        self.path: list[Step] = []
+
+    @property
+    def count(self) -> int:
+        """Different flights that the search asked for."""
+        return len(self._asked)
+
+    def fly(self, of: int, points: np.ndarray) -> np.ndarray:
+        """Return the numbers at points, (n, p), of a build, (n,); inf where there is none that is finite or below.
+
+        Raises
+        ------
+        SpentError
+            Where the budget does not allow them.
+        """
+        points = np.asarray(points, dtype=float).reshape(-1, self.space.size)
+        rows = self.space.rows(points)
+        fresh = {(of, row.tobytes()) for row in rows} - self._asked
+        if self.count + len(fresh) > self.most:
+            raise SpentError
+        lacking = np.unique(rows[~self._journal.known(of, rows)], axis=0)
+        if len(lacking):
+            self._journal.note(of, lacking, self.builds[of].at(lacking))
+            self.flown += len(lacking)
+        self._asked |= fresh
+        if self._told and fresh:
+            self._told(self.count, self.most)
+        values = self._journal.numbers(of, rows)
+        values = np.where(np.isnan(values), math.inf, values)
+        best = int(np.argmin(values))
+        if self.lowest is None or values[best] < self.lowest.value:
+            self.lowest = Trial(of, points[best], float(values[best]))
+        return values
+
+    def best(self, of: int, points: np.ndarray) -> Trial:
+        """Return the flight of the smallest number among points."""
+        values = self.fly(of, points)
+        place = int(np.argmin(values))
+        return Trial(of, np.asarray(points)[place], float(values[place]))
+
+    def slope(self, at: Trial, step: float) -> np.ndarray:
+        """Return the slope at a flight by differences of one side, (p,); NaN where a flight has no number."""
+        return differences(self.space, lambda points: self.fly(at.of, points), at.point, step, at.value)
+
+    def note(self, did: str, at: Trial) -> Trial:
+        """Put a flight on the search's path where it is lower than all before, or on the boundary; return it."""
+        if did == "boundary" or all(at.value < step.robustness for step in self.path):
+            self.path.append(Step(did, self.count, at.value, float(self.space.distance(at.point)[0])))
+        return at
