@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from casadi_gnc.missions.requirements import Requirement, Verdict
     from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
     from casadi_gnc.missions.timing import Noise, Timing
-    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all, margins, vary
+    from casadi_gnc.problem_files.by_name import campaign, check, fly, fly_all, margins, sensitivities, vary
     from casadi_gnc.problem_files.document import shipped
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.signals import Layout, Signal
@@ -76,6 +76,7 @@ _HOMES = {
     "load": "problem_files.loading",
     "margins": "problem_files.by_name",
     "option": "laws",
+    "sensitivities": "problem_files.by_name",
     "shipped": "problem_files.document",
     "table": "tables.part",
     "vary": "problem_files.by_name",
@@ -119,6 +120,7 @@ __all__ = [
     "load",
     "margins",
     "option",
+    "sensitivities",
     "shipped",
     "table",
     "vary",

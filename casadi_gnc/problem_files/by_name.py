@@ -22,6 +22,8 @@ from casadi_gnc.problem_files.loading import load
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.result import Campaign
     from casadi_gnc.checking.broken_loops import SchemeMargins
+    from casadi_gnc.missions.requirements import Requirement
+    from casadi_gnc.missions.sensitivities import Sensitivities
 
 
 def mission_of(problem: Any, *, strict: bool = True) -> Mission:
@@ -120,6 +122,32 @@ def vary(
     """
     with _about(problem):
         return OneBuild(columns.vary(mission_of(problem), [keys] if isinstance(keys, str) else keys, scheme), **options)
+
+
+def sensitivities(
+    problem: str | Path | Mission, keys: str | Sequence[str], of: str | Requirement, scheme: str | None = None
+) -> Sensitivities:
+    """Return what flies a scheme with derivatives of one number by some of its own; the mission may be a file's name.
+
+    Parameters
+    ----------
+    problem : a mission, a problem file, or the name of a shipped one.
+    keys : paths, as of a `[[dispersion]]`; one that leads to a list stands for all numbers there.
+    of : the name of a metric; or a requirement or its id, whose robustness is meant.
+    scheme : its name; the first one of the mission by default.
+
+    Examples
+    --------
+    >>> gain = "scheme.observer_pinv.law.rate_gain"
+    >>> slopes = sensitivities("huang2020/detumble", gain, "settling_time", "observer_pinv")
+    >>> found = slopes.at(temperature=0.01)  # of the time at which the straight line between samples crosses
+    >>> f"{found.exact:.1f} s, {found[gain]:.1f} s for each unit of the gain"
+    '967.2 s, 12.2 s for each unit of the gain'
+    """
+    from casadi_gnc.missions.sensitivities import sensitivities as made
+
+    with _about(problem):
+        return made(mission_of(problem), keys, of, scheme)
 
 
 def _about(problem: Any) -> AbstractContextManager[None]:
