@@ -120,7 +120,7 @@ def _moving(loop: BrokenLoop) -> BrokenLoop:
 @lru_cache(maxsize=16)
 def _slopes(mission: Mission, scheme: Scheme) -> ca.Function:
     """Return (t, x, m, seen) -> slopes of the plant by state and effort, of what is read of it, and of the law."""
-    loop = Loop(mission, scheme)
+    loop = Loop(mission, scheme, averaged=True)
     s, quiet, sampled = loop.symbols(), mission.quiet(), mission.timing.mode == "sampled"
     y = loop.sensed(s.t, s.x, quiet)
     seen = ca.SX.sym("seen", loop.seen(y).numel())

@@ -169,7 +169,7 @@ def driven(step: np.ndarray, push: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=_KEPT)
 def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Function]:
     """Return (t, x, m) -> regulated states and memory, moved, or their rates; and the Jacobians of that."""
-    loop = Loop(mission, scheme)
+    loop = Loop(mission, scheme, averaged=True)
     s, quiet, sampled = loop.symbols(), mission.quiet(), mission.timing.mode == "sampled"
     y = loop.sensed(s.t, s.x, quiet)
     seen = loop.seen(y)

@@ -70,7 +70,8 @@ class Controller:
     before    t, y, good, m, actuators, [e] -> accepted, wanted, limited, lower, upper, flags, carried
     allocate  limited, actuators, lower, upper, carried, [e] -> allocated   (where it is an expression)
     judge     told, carried, [e] -> verdict
-    after     told, carried, [e] -> memory
+    modulate  told, carried, [e] -> pulses, carry, the last of the memory    (where actuators make pulses)
+    after     told, carried, [e] -> memory, the rest of it
     ========  ===========================================================================
 
     Parameters
@@ -85,6 +86,7 @@ class Controller:
     tunables : parameters that stay variables.
     allocation : the problem that the on-board solver solves in each step, or None.
     statuses : bit -> (name, sentence), those that a controller can raise.
+    carry : how many numbers of the memory, the last ones, pulses carry over.
     monitor : what the package watches on board, or None.
     """
 
@@ -107,6 +109,7 @@ class Controller:
     tunables: tuple[Tunable, ...] = ()
     allocation: AllocationProblem | None = None
     monitor: Monitor | None = None
+    carry: int = 0
 
     def __post_init__(self) -> None:
         for layout in (self.measured, self.memory, self.outputs):

@@ -72,8 +72,10 @@ class Machine:
             ports = {"limited": now["limited"], "actuators": self._told, "carried": now["carried"]}
             told = self._run("allocate", **ports, **box)["allocated"]
         status |= int(self._run("judge", told=told, carried=now["carried"])["verdict"][0])
-        self._memory = self._run("after", told=told, carried=now["carried"])["memory"]
-        self._good, self._told = now["accepted"], np.array(told)
+        self._good, self._told, carry = now["accepted"], np.array(told), np.zeros(0)
+        if "modulate" in self._c.tapes:
+            told, carry = self._run("modulate", told=told, carried=now["carried"]).values()
+        self._memory = np.append(self._run("after", told=told, carried=now["carried"])["memory"], carry)
         given = {"t": t, "y": now["accepted"], "actuators": told, "report": report, "status": status}
         seen = self._watched(**given, wanted=now["wanted"], limited=now["limited"])
         return np.concatenate([told, now["wanted"], now["limited"], report, seen, [status]])

@@ -34,6 +34,7 @@ _NOTES = {
     "before": "From the measurement to the limited effort and the bounds of the actuators.",
     "allocate": "From the limited effort to the actuators.",
     "judge": "What is known once the actuators are.",
+    "modulate": "Pulses of what is asked of the actuators, and what they carry over.",
     "after": "The memory one sample later.",
 }
 
@@ -82,7 +83,8 @@ def render_source(controller: Controller, options: Options) -> str:
     """
     tapes, calls = [], {}
     for name in _NOTES:
-        if name not in controller.tapes or (name in ("start", "after") and not controller.memory.size):
+        own = {"start": controller.memory.size, "after": controller.memory.size - controller.carry}
+        if name not in controller.tapes or not own.get(name, True):
             continue
         text, call = _print(name, controller, options)
         tapes.append({"text": text, "note": _NOTES[name]})
@@ -172,7 +174,9 @@ def _places(name: str, controller: Controller) -> dict[str, list[str]]:
         "e": elements("params->derived", _derived(controller)),
         "derived": elements("params->derived", _derived(controller)),
         "accepted": elements("now->accepted", y.size),
-        "memory": elements("now->memory", memory),
+        "memory": elements("now->memory", memory)[: memory - controller.carry],
+        "carry": elements("now->memory", memory)[memory - controller.carry :],
+        "pulses": elements("now->actuators", count),
         "wanted": elements("now->wanted", n),
         "limited": elements("now->limited", n),
         "lower": elements("now->lower", count),
@@ -215,12 +219,13 @@ def _copies(controller: Controller) -> dict[str, list[str]]:
     told = elements("now.actuators", count)
     results = _copy(access(controller.measured, "state->good."), elements("now.accepted", controller.measured.size))
     results += _copy(access(controller.memory, "state->memory."), elements("now.memory", controller.memory.size))
-    results += _copy(access(controller.actuators, "state->previous."), told)
+    asked = _copy(access(controller.actuators, "state->previous."), told)
+    results += [] if controller.carry else asked
     results += _copy(access(controller.actuators, "output->"), told)
     results += _copy(access(controller.wanted, "output->"), elements("now.wanted", efforts))
     results += _copy(access(controller.limited, "output->"), elements("now.limited", efforts))
     previous = _copy(elements("now.previous", count), access(controller.actuators, "state->previous."))
-    return {"results": results, "previous": previous}
+    return {"results": results, "previous": previous, "asked": asked if controller.carry else []}
 
 
 def _checks(controller: Controller, options: Options) -> list[str]:

@@ -113,6 +113,18 @@ class Component:
         """Return the derivatives of states that are neither coordinates nor speeds."""
         return {}
 
+    def timed(self, period: float, step: float) -> Component:
+        """Return the part as told every `period` [s] and integrated by `step`; both 0 in continuous flight."""
+        return self
+
+    def averaged(self) -> Component:
+        """Return the part as linear analysis takes it, with the same state: what it makes of a command at once."""
+        return self
+
+    def settle(self, own: Any) -> dict[str, Any]:
+        """Return by signal what changes of its state between two samples."""
+        return {}
+
     def flags(self, own: Any, told: Any) -> dict[Any, Any]:
         """Return flags by status bit: what truly happened."""
         return {}

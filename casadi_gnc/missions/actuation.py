@@ -12,6 +12,7 @@ from casadi_gnc.allocation import Direct
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws.efforts import TORQUE
 from casadi_gnc.mathematics.exact import array
+from casadi_gnc.missions.modulated import Modulation
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
 
@@ -34,6 +35,7 @@ class Actuators:
     judge : function (measured signals, limited effort, actuators) -> flags by status bit, on board.
     inverse : function (measured signals, limited effort) -> actuators, (N,), that a craft knows better than an
         allocator could: the allocator is then given this in the place of the effort.
+    modulation : what makes pulses of what the allocation asks, where actuators know on and off alone.
     """
 
     effectiveness: ca.DM | Callable[[Any], Any]
@@ -44,6 +46,7 @@ class Actuators:
     reach: Callable[[Any, float], tuple[Any, Any]] | None = None
     judge: Callable[[Any, Any, Any], dict[StepStatus, Any]] | None = None
     inverse: Callable[[Any, Any], Any] | None = None
+    modulation: Modulation | None = None
 
     def __post_init__(self) -> None:
         if not callable(self.effectiveness):

@@ -1,6 +1,6 @@
 """One sample of a scheme, composed once: flights, packages, analysis and linearisation are slices of it.
 
-    measure -> accept -> (estimate) -> command -> clip -> allocate -> judge -> advance
+    measure -> accept -> (estimate) -> command -> clip -> allocate -> judge -> (modulate) -> advance
 
 =========  ==================================================================  ==============================
 slice      what                                                                name in the code
@@ -11,13 +11,14 @@ before     t, y, good, m, actuators -> accepted, memory, wanted, limited,      b
            lower, upper, flags: all that comes before the allocation
 allocate   accepted, limited, actuators, lower, upper -> actuators             allocated
 judge      accepted, limited, actuators -> flags, once these are known         judged
+modulate   asked, memory -> actuators, memory, where actuators make pulses     modulated
 after      t, accepted, memory, wanted, limited, actuators -> memory           remembered
 plant      t, x, actuators, noise -> x, one Runge-Kutta step                   stepped
 =========  ==================================================================  ==============================
 
 `wanted` is the law's command, `limited` the same inside the virtual-control box, `actuators` what they are
-told, `good` the last accepted measurement. Of these, before, allocate, judge and after fly. Every law and every
-plant fits: what one leaves out is empty.
+told, `good` the last accepted measurement. Of these, before, allocate, judge, modulate and after fly. Every law and
+every plant fits: what one leaves out is empty.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
-from casadi_gnc.laws import advance
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.missions import asking
-from casadi_gnc.missions.navigated import Navigated
+from casadi_gnc.missions.modulated import Modulated
 from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.missions.wrapped import advanced
 from casadi_gnc.status import StepStatus
 
 if TYPE_CHECKING:
@@ -68,13 +69,16 @@ class Symbols:
 class Loop:
     """Compose one sample of a mission's scheme out of plant, law and actuation.
 
-    The methods take CasADi columns and return expressions. An answer of a plant or a law that does not fit is
+    `averaged` takes the plant as linear analysis does. The methods take CasADi columns and return expressions. An
+    answer of a plant or a law that does not fit is
     a `LawError` naming class and method.
     """
 
-    def __init__(self, mission: Mission, scheme: Scheme) -> None:
+    def __init__(self, mission: Mission, scheme: Scheme, *, averaged: bool = False) -> None:
         self.mission, self.scheme = mission, scheme
         self.plant, self.law, self.actuation = mission.truth, scheme.flown, scheme.actuation
+        if averaged:
+            self.plant = self.plant.averaged()
 
     def symbols(self) -> Symbols:
         """Return fresh columns of one sample."""
@@ -225,6 +229,15 @@ class Loop:
         asked = limited if actuation.inverse is None else actuation.inverse(seen, limited)
         return actuation.allocator.expression(asked, previous, lower, upper, actuation.matrix(seen))
 
+    def modulated(self, asked: Any, memory: Any) -> tuple[Any, Any]:
+        """Return what the actuators are told, (N,), and the memory, for what the allocation asks of them."""
+        if not isinstance(self.law, Modulated):
+            return asked, memory
+        own, carried = self.law.split(memory)
+        modulation, period = self.law.modulation, self.mission.timing.sample_period
+        told, left = modulation(asked, modulation.memory.split(carried), period)
+        return told, ca.vertcat(own, left)
+
     def made(self, y: Any, actuators: Any) -> Any:
         """Return the effort that the actuators make as far as the flight software knows, (R,)."""
         return ca.mtimes(self.actuation.matrix(self.plant.measurement.split(y)), actuators)
@@ -254,9 +267,7 @@ class Loop:
     def advanced(self, t: Any, seen: Any, memory: Any, wanted: Any, achieved: Any) -> Any:
         """Return the memory one sample later, told what was achieved."""
         self.flowing(t, seen, memory, wanted, achieved)
-        if isinstance(self.law, Navigated):
-            return self.law.advanced(t, seen, memory, wanted, achieved)
-        return advance(self.law, t, seen, memory, wanted, achieved)
+        return advanced(self.law, t, seen, memory, wanted, achieved)
 
     def flowing(self, t: Any, seen: Any, memory: Any, wanted: Any, achieved: Any) -> Any:
         """Return d(memory)/dt."""
@@ -267,9 +278,10 @@ class Loop:
         """Return all of one sample on board where the allocation is an expression."""
         first = self.before(s.t, s.y, s.good, s.m, s.actuators)
         y, limited = first["accepted"], first["limited"]
-        told = self.allocated(y, limited, s.actuators, first["lower"], first["upper"])
-        later = self.remembered(s.t, y, first["memory"], first["wanted"], limited, told)
-        flags = first["flags"] + self.judged(y, limited, told)
+        asked = self.allocated(y, limited, s.actuators, first["lower"], first["upper"])
+        told, memory = self.modulated(asked, first["memory"])
+        later = self.remembered(s.t, y, memory, first["wanted"], limited, told)
+        flags = first["flags"] + self.judged(y, limited, asked)
         return {**first, "actuators": told, "memory_next": later, "flags": flags}
 
     def raised(self) -> list[StepStatus]:

@@ -94,7 +94,7 @@ class VirtualMachineEngine:
                 kept += 1
             self._advance(carried, s)
             carried.x[:] = tape["settle"].one(x=carried.x)
-            carried.actuators[:] = s["told"]
+            carried.actuators[:] = s.get("asked", s["told"])
         return samples
 
     def _control(self, carried: Carried, s: dict[str, Any]) -> dict[str, Any]:
@@ -107,9 +107,14 @@ class VirtualMachineEngine:
         s["y"] = tape["sense"].one(**s)
         s |= tape["before"](**s)
         if self._solve is None:
-            return {**s, **tape["allocate"](**s)}
-        told, noted, report = self._solve(s["limited"], carried.actuators.copy(), s["lower"], s["upper"])
-        return {**s, "told": told, "report": report, "allocation_flags": float(noted)}
+            s |= tape["allocate"](**s)
+        else:
+            told, noted, report = self._solve(s["limited"], carried.actuators.copy(), s["lower"], s["upper"])
+            s |= {"told": told, "report": report, "allocation_flags": float(noted)}
+        if "modulate" in tape:
+            s["asked"] = s["told"]
+            s["told"], s["memory"] = tape["modulate"](**s).values()
+        return s
 
     def _slope(self, s: dict[str, Any]) -> np.ndarray:
         """Return the rates of plant and memory at a point of the integrator."""

@@ -110,7 +110,8 @@ class Mission:
     @cached_property
     def truth(self) -> Plant:
         """The plant: what truly moves, and what the sensors say."""
-        return self.parts_asked.plant.timed(self.timing.sample_period if self.timing.mode == "sampled" else 0.0)
+        hold = self.timing.sample_period if self.timing.mode == "sampled" else 0.0
+        return self.parts_asked.plant.timed(hold, hold / self.timing.substeps)
 
     @cached_property
     def start(self) -> list[Any]:

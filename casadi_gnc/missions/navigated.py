@@ -8,14 +8,14 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.errors import LawError
-from casadi_gnc.laws import Law, advance
 from casadi_gnc.missions import asking
+from casadi_gnc.missions.wrapped import Wrapped, advanced
 from casadi_gnc.navigation import Navigation
 from casadi_gnc.status import StepStatus
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Navigated(Law):
+class Navigated(Wrapped):
     """Fly a law on what a navigation makes of the measurement; its memory is the navigation's, then the law's.
 
     Parameters
@@ -24,7 +24,6 @@ class Navigated(Law):
     navigation : reads the measurement.
     """
 
-    law: Law
     navigation: Navigation
 
     def __post_init__(self) -> None:
@@ -45,27 +44,6 @@ class Navigated(Law):
         }
         for name, value in columns.items():
             object.__setattr__(self, name, value)
-
-    @property
-    def belief(self) -> Any:
-        """What the law believes of the craft."""
-        return self.law.belief
-
-    def believed_inertia(self) -> Any:
-        """Return the inertia that the law works with."""
-        return self.law.believed_inertia()
-
-    def check_hold(self) -> None:
-        """Raise `LawError` if the law cannot work at its sample period."""
-        self.law.check_hold()
-
-    def keeps(self, signal: str) -> bool:
-        """Return whether the law means to keep a signal inside its funnel."""
-        return self.law.keeps(signal)
-
-    def checks(self) -> Any:
-        """Return what can be said of the law's gains alone."""
-        return self.law.checks()
 
     def _parts(self, m: Any) -> tuple[Any, Any]:
         own = self.navigation.memory.size
@@ -109,7 +87,7 @@ class Navigated(Law):
     def advanced(self, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any:
         """Return the memory one hold later; the law sees the navigation's signals held, as it would a measurement."""
         known, own = self._parts(m)
-        return ca.vertcat(known, advance(self.law, t, self._seen(t, y, known), own, wanted, achieved))
+        return ca.vertcat(known, advanced(self.law, t, self._seen(t, y, known), own, wanted, achieved))
 
     def status(self, t: Any, y: Any, m: Any) -> dict[StepStatus, Any]:
         """Return the flags of both."""

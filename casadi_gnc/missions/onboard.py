@@ -1,6 +1,6 @@
 """What flies of a mission's scheme: a controller that `casadi_gnc.embedded` can make C of.
 
-    before -> allocate -> judge -> after
+    before -> allocate -> judge -> (modulate) -> after
 
 These are slices of the loop (`casadi_gnc.missions.loop`) that a simulated flight is made of. Gains named as
 tunable become symbols; all that depends on them alone is taken out of the step (`extract_parametric`)
@@ -70,6 +70,7 @@ def describe(
         period=mission.timing.sample_period,
         measured=truth.measurement,
         memory=chosen.flown.memory,
+        carry=carried_over(chosen),
         wanted=actuation.named("wanted"),
         limited=actuation.named("limited"),
         actuators=truth.inputs,
@@ -112,8 +113,13 @@ def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
     first = loop.before(s.t, s.y, s.good, s.m, s.actuators)
     y, limited = first["accepted"], first["limited"]
     told = loop.plant.inputs.symbol("told")
+    pulses, kept = loop.modulated(told, first["memory"])
+    late = {"judge": {"verdict": loop.judged(y, limited, told)}}
+    if loop.actuation.modulation is not None:
+        late["modulate"] = {"pulses": pulses, "carry": kept[-loop.actuation.modulation.memory.size :]}
+    # What pulses carry over is known from then on, and the last of the memory.
     memory = loop.remembered(s.t, y, first["memory"], first["wanted"], limited, told)
-    late = {"judge": {"verdict": loop.judged(y, limited, told)}, "after": {"memory": memory}}
+    late["after"] = {"memory": memory[: memory.shape[0] - carried_over(loop.scheme)]}
     inputs = s.ports("t", "y", "good", "m", "actuators")
     now = {key: first[key] for key in ("accepted", "wanted", "limited", "lower", "upper", "flags")}
     made: _Made = {"start": (s.ports("t", "y"), {"m": loop.started(s.t, s.y)}), "before": (inputs, now)}
@@ -126,6 +132,12 @@ def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
     for name, (ports, outputs) in made.items():
         functions[name] = tapes.function(name, {**ports, **e}, outputs)
     return functions
+
+
+def carried_over(scheme: Scheme) -> int:
+    """Return how many numbers of a scheme's memory, the last ones, are what pulses carry over."""
+    modulation = scheme.actuation.modulation
+    return 0 if modulation is None else modulation.memory.size
 
 
 def sampled(mission: Mission) -> Mission:

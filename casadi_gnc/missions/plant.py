@@ -32,8 +32,15 @@ class Plant:
     #: True signals that are recorded besides the state.
     outputs: Any = Layout()
 
-    def timed(self, hold: float) -> Plant:
-        """Return the plant as it is when sampled every `hold` seconds, 0 in continuous flight: sensors may need it."""
+    def timed(self, hold: float, step: float) -> Plant:
+        """Return the plant as sampled every `hold` seconds and integrated by `step`; both 0 in continuous flight.
+
+        Sensors and pulses may need them.
+        """
+        return self
+
+    def averaged(self) -> Plant:
+        """Return the plant as linear analysis takes it, with the same state: a command acts at once, by its mean."""
         return self
 
     def inertias(self) -> Mapping[str, Any]:

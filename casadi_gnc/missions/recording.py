@@ -57,8 +57,11 @@ def watched(loop: Loop, t: Any, y: Any) -> tuple[dict[str, Any], Any]:
     return shown, left
 
 
-def observed(loop: Loop, s: Symbols, flags: Any, report: Any) -> Any:
-    """Return one row of the record, its status completed by what is seen from outside."""
+def observed(loop: Loop, s: Symbols, asked: Any, flags: Any, report: Any) -> Any:
+    """Return one row of the record, its status completed by what is seen from outside.
+
+    `asked` is what the allocation asked of the actuators; what they are told may be pulses.
+    """
     plant, law, actuation = loop.plant, loop.law, loop.actuation
     seen = loop.seen(s.y)
     outside = {
@@ -79,7 +82,7 @@ def observed(loop: Loop, s: Symbols, flags: Any, report: Any) -> Any:
         **asking.shown(law, asking.ask(law, "show", s.t, seen, s.m), law.outputs),
         **shown,
         **vars(actuation.allocator.report.split(report)),
-        status=flags + loop.judged(s.y, s.limited, s.actuators) + weighed(outside),
+        status=flags + loop.judged(s.y, s.limited, asked) + weighed(outside),
     )
 
 

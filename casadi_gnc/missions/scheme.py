@@ -10,6 +10,7 @@ from typing import Literal
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws import Law, PerformanceFunnel
 from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.modulated import made_of
 from casadi_gnc.missions.navigated import Navigated
 from casadi_gnc.navigation import Navigation
 from casadi_gnc.tables.part import NAME, Part
@@ -49,10 +50,11 @@ class Scheme:
 
     @cached_property
     def flown(self) -> Law:
-        """The law as it flies: behind its navigation where it has one."""
-        if self.navigation is None:
-            return self.law
-        return Navigated(hold=self.law.hold, printed=self.law.printed, law=self.law, navigation=self.navigation)
+        """The law as it flies: behind its navigation, and before its modulation, where it has them."""
+        law = self.law
+        if self.navigation is not None:
+            law = Navigated(hold=law.hold, printed=law.printed, law=law, navigation=self.navigation)
+        return made_of(law, self.actuation.modulation)
 
 
 @dataclass(frozen=True, eq=False)

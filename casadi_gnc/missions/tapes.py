@@ -8,6 +8,7 @@ draw      uniform -> noise, normal numbers                      (where the plant
 sense     t, [middle], x, noise -> y
 before    t, [middle], y, good, m, actuators -> accepted, memory, wanted, limited, lower, upper, flags
 allocate  accepted, limited, actuators, lower, upper -> told     (where the allocation is symbolic)
+modulate  asked, memory -> told, kept                            (where actuators make pulses; sampled mode)
 after     t, accepted, memory, wanted, limited, told -> m        (sampled mode)
 rate      t, middle, x, told, noise -> slope of x, way: the slope times half a step      (sampled mode)
 plant     t, x, told, noise -> x, one Runge-Kutta step: four times `rate` and what joins them, with the same words
@@ -120,6 +121,11 @@ def tapes_of(mission: Mission, scheme: Scheme, parameters: Parameters | None = N
         answer = loop.allocated(s.y, s.limited, s.actuators, s.lower, s.upper)
         given = {"accepted": s.y, **s.ports("limited", "actuators", "lower", "upper")}
         parts["allocate"] = (given, {"told": answer})
+    if scheme.actuation.modulation is not None:
+        if timing.mode != "sampled":
+            raise FlightError(f'scheme {scheme.name!r} makes pulses, one a sample; fly it in mode "sampled"')
+        pulses, kept = loop.modulated(s.actuators, s.m)
+        parts["modulate"] = ({"asked": s.actuators, "memory": s.m}, {"told": pulses, "kept": kept})
     if timing.mode == "sampled":
         later = loop.remembered(s.t, s.y, s.m, s.wanted, s.limited, s.actuators)
         parts["after"] = ({"t": s.t, **sample}, {"m": later})
@@ -170,9 +176,12 @@ def _observe(loop: Loop) -> Ports:
     """Return the ports of the tape that lays out one row of the record, status bits completed."""
     s = loop.symbols()
     flags, report = ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report")
-    row = observed(loop, s, flags, report)
     given = {**s.ports("t", "x"), "accepted": s.y, "memory": s.m, **s.ports("wanted", "limited")}
-    return {**given, "told": s.actuators, "flags": flags, "report": report}, {"row": row}
+    given |= {"told": s.actuators, "flags": flags, "report": report}
+    asked = s.actuators
+    if loop.actuation.modulation is not None:
+        given["asked"] = asked = loop.plant.inputs.symbol("asked")
+    return given, {"row": observed(loop, s, asked, flags, report)}
 
 
 def _stage(loop: Loop) -> Ports:

@@ -10,8 +10,8 @@ import numpy as np
 from casadi_gnc.laws import Law, advance, gains_of
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.navigated import Navigated
 from casadi_gnc.missions.recording import observed
+from casadi_gnc.missions.wrapped import Wrapped
 from casadi_gnc.testing.asserting import must, numbers
 
 #: A hold so short that what a law does over it is its rate, [s].
@@ -34,7 +34,7 @@ def check_law(mission: Mission, scheme: str | None = None) -> None:
     loop, law = Loop(mission, chosen), chosen.law
     measured = ca.DM(loop.seen(mission.first_measurement()))
     y = measured
-    if isinstance(loop.law, Navigated):
+    if isinstance(loop.law, Wrapped):
         y = ca.DM(loop.law.read(0.0, measured, loop.started(0.0, mission.first_measurement())))
     _check_declarations(type(law))
     held = mission.timing.sample_period
@@ -69,7 +69,7 @@ def _check_sizes(loop: Loop, law: Law, y: ca.DM) -> None:
     s = held.symbols()
     held.before(s.t, s.y, s.good, s.m, s.actuators)
     held.advanced(0.0, y, memory, wanted, wanted)
-    observed(held, s, ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report"))
+    observed(held, s, s.actuators, ca.SX.sym("flags"), loop.actuation.allocator.report.symbol("report"))
 
 
 def _check_short_hold(law: Law, y: ca.DM) -> None:

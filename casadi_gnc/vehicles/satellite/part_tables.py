@@ -12,10 +12,12 @@ from typing import Annotated, Any
 import casadi as ca
 from pydantic import Field, field_validator, model_validator
 
+from casadi_gnc.allocation.pulses import Pulse, PulseModulation
 from casadi_gnc.mathematics import exact
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import appendages
 from casadi_gnc.mechanics import satellite_parts as parts
+from casadi_gnc.mechanics.firing import FiringThrusters
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
 
@@ -74,6 +76,15 @@ class WheelTable(Axial):
         return math.inf if self.max_momentum_N_m_s is None else self.max_momentum_N_m_s / self.spin_inertia
 
 
+class PulseTable(Part):
+    """Pulses of a thruster that knows on and off alone: one a sample, its width from what is asked of it."""
+
+    least_on_s: NonNegative = Field(default=0.0, description="least width of a pulse")
+    quantum_s: NonNegative = Field(default=0.0, description="least difference of two widths; 0: any width")
+    delay_s: NonNegative = Field(default=0.0, description="from the sample to the pulse, less than a sample period")
+    carry: bool = Field(default=True, description="what a pulse lacks is carried over to the next (sigma-delta)")
+
+
 class ThrusterTable(Part):
     """A thruster; its command is its force."""
 
@@ -81,6 +92,9 @@ class ThrusterTable(Part):
     direction: Vector = Field(description="of the force on the body, unit vector")
     max_force_N: Positive
     min_force_N: NonNegative = 0.0
+    rise_time_s: NonNegative = Field(default=0.0, description="to 63 % of the force, and down to 37 %")
+    specific_impulse_s: Positive | None = Field(default=None, description="propellant is counted by it")
+    pulse: PulseTable | None = Field(default=None, description="the thruster knows on and off alone")
 
     _unit = field_validator("direction")(matrices.check_unit)
 
@@ -88,7 +102,14 @@ class ThrusterTable(Part):
     def _fit(self) -> ThrusterTable:
         if self.min_force_N > self.max_force_N:
             raise MisfitError(f"{self.min_force_N:g} exceeds max_force_N {self.max_force_N:g}", "min_force_N")
+        if self.pulse is not None and not exact.is_zero(self.min_force_N):
+            raise MisfitError("a thruster that makes pulses is off in between; leave min_force_N out", "min_force_N")
         return self
+
+    @property
+    def fires(self) -> bool:
+        """Whether its force is more than what it is told."""
+        return self.pulse is not None or self.specific_impulse_s is not None or not exact.is_zero(self.rise_time_s)
 
 
 class MagnetorquerTable(Axial):
@@ -146,7 +167,31 @@ def wheels(tables: Sequence[WheelTable]) -> parts.Wheels:
 
 def thrusters(tables: Sequence[ThrusterTable]) -> parts.Thrusters:
     """Return the thrusters as one part."""
-    return parts.Thrusters(columns(tables, "position_m"), directions(tables, "direction"))
+    positions, pushes = columns(tables, "position_m"), directions(tables, "direction")
+    if not any(table.fires for table in tables):
+        return parts.Thrusters(positions, pushes)
+    return FiringThrusters(
+        positions,
+        pushes,
+        _of(tables, "max_force_N"),
+        _of(tables, "rise_time_s"),
+        array([table.specific_impulse_s or 0.0 for table in tables]),
+        tuple(table.pulse is not None for table in tables),
+        array([0.0 if table.pulse is None else table.pulse.delay_s for table in tables]),
+    )
+
+
+def modulation(between: int, tables: Sequence[ThrusterTable], after: int) -> PulseModulation | None:
+    """Return what makes pulses of what is asked of thrusters, between other actuators; None where none makes any."""
+    if all(table.pulse is None for table in tables):
+        return None
+    pulses = [
+        None if pulse is None else Pulse(pulse.least_on_s, pulse.quantum_s, pulse.carry)
+        for pulse in (table.pulse for table in tables)
+    ]
+    none = [None] * between, [None] * after
+    most = [*none[0], *(table.max_force_N for table in tables), *none[1]]
+    return PulseModulation((*none[0], *pulses, *none[1]), most)
 
 
 def magnetorquers(tables: Sequence[MagnetorquerTable]) -> parts.Magnetorquers:

@@ -67,11 +67,24 @@ class Satellite(Plant):
     estimated: bool = False
     reference: Reference = field(default_factory=Reference)
 
-    def timed(self, hold: float) -> Satellite:
-        """Return the satellite whose sensors know the sample period [s]; raise `FlightError` where there is none."""
+    def timed(self, hold: float, step: float) -> Satellite:
+        """Return the satellite whose sensors and parts know the sample period [s] and the integrator's step.
+
+        Raises
+        ------
+        FlightError
+            For sensors or pulses without samples.
+        """
         if self.sensors and not hold:
             raise FlightError(f"{self.sensors[0].name} is a sensor that is sampled; fly in mode sampled")
-        return replace(self, sensors=tuple(replace(sensor, hold=hold) for sensor in self.sensors))
+        parts = tuple(part.timed(hold, step) for part in self.assembly.components)
+        sensors = tuple(replace(sensor, hold=hold) for sensor in self.sensors)
+        return replace(self, assembly=replace(self.assembly, components=parts), sensors=sensors)
+
+    def averaged(self) -> Satellite:
+        """Return the satellite whose parts do at once what they are told."""
+        parts = tuple(part.averaged() for part in self.assembly.components)
+        return replace(self, assembly=replace(self.assembly, components=parts))
 
     @cached_property
     def state(self) -> Layout:
@@ -158,7 +171,8 @@ class Satellite(Plant):
     def settle(self, x: Any) -> Any:
         """Return the same physical state in the representation kept between steps (|sigma| <= 1)."""
         now = self.state.split(x)
-        return self.state.pack(**{**vars(now), "mrp": attitude.short_way(now.mrp)})
+        moved = {name: value for part in self.assembly.components for name, value in part.settle(now).items()}
+        return self.state.pack(**{**vars(now), **moved, "mrp": attitude.short_way(now.mrp)})
 
     def show(self, t: Any, x: Any, actuators: Any) -> dict[str, Any]:
         """Return the pointing error and the momentum."""

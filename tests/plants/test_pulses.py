@@ -1,0 +1,136 @@
+"""Pulses of thrusters: what is delivered stays with what is asked, in formulas, in a long flight and on board."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+import casadi_gnc
+from casadi_gnc.allocation.pulses import Pulse, PulseModulation
+from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics.jumps import Timed
+from casadi_gnc.mechanics.firing import STANDARD_GRAVITY, FiringThrusters
+from casadi_gnc.vehicles.satellite import part_tables
+from casadi_gnc.vehicles.satellite.part_tables import ThrusterTable
+
+PULSES = "satellites/thruster_pulses"
+#: Whose forces are worked out here by another way.
+PINV = {"scheme.1.allocation": {"method": "pinv"}}
+PERIOD, MOST, LEAST, QUANTUM = 0.2, 1.0, 0.02, 0.005
+
+
+@pytest.mark.parametrize(
+    ("pulse", "bit"), [(Pulse(0.03, 0.007), 0.03), (Pulse(0.0, 0.02), 0.02), (Pulse(0.014, 0.01), 0.014), (Pulse(), 0)]
+)
+def test_what_is_carried_over_stays_within_half_a_bit(pulse, bit):
+    most, asked = 2.5, ca.SX.sym("asked", 2)
+    modulation, carried = PulseModulation((None, pulse), [9.0, most]), ca.SX.sym("carried")
+    told, left = modulation(asked, modulation.memory.split(carried), PERIOD)
+    step = ca.Function("step", [asked, carried], [told, left])
+    generator = np.random.default_rng(3)
+    wanted = generator.uniform(0, 1, 400) ** generator.choice([1, 6], 400) * most
+    wanted[::37], wanted[::41] = 0.0, most
+    found, rest = _run(step, wanted)
+    widths = found[:, 1] * PERIOD / most
+    assert np.array_equal(found[:, 0], wanted)  # it makes what it is told
+    delivered = np.cumsum(found[:, 1]) * PERIOD
+    assert np.abs(np.cumsum(wanted) * PERIOD - delivered - rest).max() < 1e-12
+    assert np.abs(rest).max() <= 0.5 * bit * most + 1e-12
+    assert widths.min() >= 0
+    assert widths.max() <= PERIOD + 1e-15
+    assert widths[widths > 0].min() >= pulse.least_on
+    if pulse.quantum:
+        steps = widths / pulse.quantum
+        ends = np.isclose(widths, pulse.least_on) | np.isclose(widths, PERIOD)
+        assert np.all(ends | np.isclose(steps, np.round(steps), atol=1e-9))
+
+
+def _run(step, wanted):
+    told, carried = [], [0.0]
+    for each in wanted:
+        pulses, left = step([each, each], carried[-1])
+        told.append(np.array(pulses).ravel())
+        carried.append(float(left))
+    return np.array(told), np.array(carried[1:])
+
+
+def test_width_alone_carries_nothing_over():
+    modulation = PulseModulation((Pulse(0.02, 0.01, carries=False),), [1.0])
+    told, left = modulation(ca.DM([0.049]), SimpleNamespace(impulse_carry=ca.DM([0.0])), PERIOD)
+    assert float(ca.DM(told)) == 0.0  # 9.8 ms of 20 ms at least
+    assert float(ca.DM(left)) == 0.0
+
+
+def test_open_time_of_each_step_is_exact_also_over_the_end_of_a_sample():
+    """Pulses of any width and delay against the overlap of their intervals, worked out by interval arithmetic."""
+    late, substeps = 0.033, 4
+    zeros = ca.DM.zeros(3, 1)
+    part = FiringThrusters(zeros, ca.DM([1, 0, 0]), [MOST], [0.0], [0.0], (True,), [late]).timed(PERIOD, PERIOD / 4)
+    t, force, left = ca.SX.sym("t"), ca.SX.sym("force"), ca.SX.sym("left")
+    opened = part.thrust(t, SimpleNamespace(pulse_left=left), SimpleNamespace(force=force))
+    timed = Timed(opened, t, {"force": force, "left": left})
+    middle = ca.SX.sym("middle")
+    mean = ca.Function("mean", [t, middle, force, left], [timed.at(t, middle, {"force": force, "left": left})])
+    step, before = PERIOD / substeps, 0.0
+    for k, width in enumerate([0.19, 0.0, 0.005, 0.2, 0.2, 0.07]):
+        for i in range(substeps):
+            begin = k * PERIOD + i * step
+            spans = [(k * PERIOD + late, width), ((k - 1) * PERIOD + late, before)]
+            right = sum(max(0, min(a + w, begin + step) - max(a, begin)) for a, w in spans) / step
+            for at in (begin, begin + step / 2, begin + step):  # the stages of a step, its end not the next one's begin
+                assert abs(float(mean(at, begin + step / 2, MOST * width / PERIOD, before)) - right) < 1e-12
+        before = width
+
+
+def test_bad_pulses():
+    pulse = {"position_m": [0.0, 0.0, 1.0], "direction": [1.0, 0.0, 0.0], "max_force_N": 1.0, "pulse": {}}
+    with pytest.raises(ValidationError, match="a thruster that makes pulses is off in between; leave min_force_N out"):
+        ThrusterTable.model_validate({**pulse, "min_force_N": 0.1})
+    part = part_tables.thrusters([ThrusterTable.model_validate({**pulse, "pulse": {"delay_s": 0.2}})])
+    with pytest.raises(FlightError, match=r"a pulse begins 0\.2 s late, expected less than the sample period, 0\.2 s"):
+        part.timed(0.2, 0.1)
+    with pytest.raises(FlightError, match='thrusters make one pulse a sample; fly in mode "sampled"'):
+        part.timed(0.0, 0.0)
+
+
+@pytest.mark.slow
+def test_a_thousand_seconds_of_pulses():
+    """Every thruster within half a least bit of what was asked, at every sample; what is asked is worked out here."""
+    mission = casadi_gnc.load(PULSES, changes=PINV)
+    flight = casadi_gnc.fly(mission, decimation=1)
+    step = mission.timing.sample_period
+    assert flight.time[-1] >= 1000.0 - step
+    made: Any = mission.scheme().actuation.effectiveness
+    asked = np.clip(np.linalg.pinv(np.array(made)) @ flight["limited"].T, 0.0, MOST).T
+    told, carry = flight["force"], flight["impulse_carry"]
+    widths = told * PERIOD / MOST
+    assert widths[widths > 0].min() >= LEAST - 1e-15
+    assert np.abs(widths / QUANTUM - np.round(widths / QUANTUM)).max() < 1e-9
+    behind = np.cumsum(asked, axis=0) * step - np.cumsum(told, axis=0) * step
+    assert np.abs(behind - carry).max() < 1e-9  # the sums' own rounding
+    assert np.abs(behind).max() <= 0.5 * LEAST * MOST + 1e-9
+    # What truly came out: all pulses ended in their sample, but for the force that still falls from the last.
+    delivered = flight["impulse"]
+    falling = 0.004 * flight["thrust"]
+    due = np.vstack([np.zeros(8), np.cumsum(told, axis=0)[:-1] * step])
+    assert np.abs(delivered + falling - due).max() < 1e-9
+    assert (widths.max(axis=1) <= step - 0.01).all()
+    assert np.abs(np.vstack([np.zeros(8), np.cumsum(asked, axis=0)[:-1] * step]) - delivered).max() <= 0.0101
+    used = delivered.sum(axis=1) / (220.0 * STANDARD_GRAVITY)
+    assert np.abs(flight["propellant"].ravel() - used).max() < 1e-15 + 1e-12 * used[-1]
+    assert flight.metrics["propellant_kg"] == pytest.approx(used[-1], rel=1e-12)
+    assert flight["pointing_error_deg"][-500:].max() < 0.2
+    # On board the pulses are the same words.
+    controller = mission.controller()
+    for t, mrp, rate, pulses in zip(flight.time[:300], flight["mrp"], flight["rate"], told, strict=False):
+        assert np.array_equal(controller.step(t, mrp=mrp, rate=rate)["force"], pulses)
+
+
+@pytest.mark.slow
+def test_pulses_have_the_same_words_on_both_engines():
+    mission = casadi_gnc.load(PULSES, changes=PINV).with_timing(duration=10.0)
+    c, vm = (casadi_gnc.fly(mission, engine=engine, maths="libm").samples for engine in ("c", "vm"))
+    assert np.array_equal(c, vm)
