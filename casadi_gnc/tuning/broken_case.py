@@ -130,7 +130,7 @@ def break_of(
     Raises
     ------
     GncError
-        Where the file cannot be written.
+        Where the file cannot be written, or what it says cannot fly.
     """
     space, changes = flights.space, flights.builds[at.of].changes
     moved = moved_of(space, at, changes, {key: _at(mission, key) for key in changes})

@@ -36,7 +36,9 @@ class Effort:
     sampled: int = 0
 
 
-def descend(flights: Flights, reach: Reach, start: Trial, scale: float, seed: int, effort: Effort) -> Trial:
+def descend(
+    flights: Flights, reach: Reach, start: Trial, scale: float, seed: int, effort: Effort, steps: int = _MOST
+) -> Trial:
     """Return the lowest flight that a descent finds; it ends at the first that breaks the requirement.
 
     Parameters
@@ -47,11 +49,12 @@ def descend(flights: Flights, reach: Reach, start: Trial, scale: float, seed: in
     scale : size of the number, such as that at the nominal.
     seed : of the points around, where slopes lead nowhere.
     effort : what is counted.
+    steps : at most.
     """
     effort.descents += 1
     now, size = start, reach.space.size
     inverse, before = np.eye(size), None
-    for number in range(_MOST):
+    for number in range(steps):
         if now.broken:
             return now
         slope = _slope(flights, now)

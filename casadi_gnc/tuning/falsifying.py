@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc.errors import CampaignError
+from casadi_gnc.errors import CampaignError, ProblemError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.problem_files.by_name import mission_of
@@ -204,10 +204,14 @@ def falsify(
         few = fewest(searched, reach, near)
         said = [f"found by casadi-gnc falsify after {first} flights"]
         for at in (near, trial):
-            broken = broken or _verified(mission, chosen, asked, searched, reach, at, place, said)
+            try:
+                broken = broken or _verified(mission, chosen, asked, searched, reach, at, place, said)
+            except ProblemError as error:
+                notes.append(f"a case that broke among many flights is refused as a file: {error}")
         beside = None if place is None else place.with_suffix(f".minimal{place.suffix}")
-        minimal = _verified(mission, chosen, asked, searched, reach, few, beside, said) or broken
-        if broken is None:
+        if broken is not None:
+            minimal = _verified(mission, chosen, asked, searched, reach, few, beside, said) or broken
+        else:
             notes.append("what broke among many flights did not break as a file of its own, and is no break")
             first = None
     least = searched.lowest

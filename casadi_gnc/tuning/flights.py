@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.errors import GncError
+from casadi_gnc.missions.parameters import Varied
 from casadi_gnc.tuning.journal import Journal
 from casadi_gnc.tuning.objective import Objective, differences
 from casadi_gnc.tuning.space import Space
@@ -49,12 +50,31 @@ class Build:
         """Return the numbers of flights, (n,), NaN where there are none."""
         if not self.why:
             try:
-                return self.objective.at(rows)
+                return self._at(rows)
             except GncError as error:
                 if self._made is not None:
                     raise
                 self.why = str(error)
         return np.full(len(rows), math.nan)
+
+    def _at(self, rows: np.ndarray) -> np.ndarray:
+        """Return the numbers of flights; none where a law cannot have its gains at its sample period, as in a file."""
+        varied = self.objective.cases.varied
+        found = np.full(len(rows), math.nan)
+        able = np.ones(len(rows), dtype=bool)
+        if any(key.startswith("scheme.") for key in varied.parameters.keys):
+            able = np.array([_holds(varied, row) for row in rows], dtype=bool)
+        if able.any():
+            found[able] = self.objective.at(rows[able])
+        return found
+
+
+def _holds(varied: Varied, row: np.ndarray) -> bool:
+    try:
+        varied.at(row).schemes[0].law.check_hold()
+    except GncError:
+        return False
+    return True
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,9 @@
 """Search for a flight that breaks a requirement: choices, downhill from the nominal, a plan, downhill from its lowest.
 
-The order is that of cost. The nominal and each choice by itself are a few flights side by side; a slope at the lowest
-of them leads, where the number is smooth, to a break with as many flights as there are dispersions. What that misses, a
-Sobol plan over the whole set looks for, twice as large each time, with descents from its lowest flights.
+The order is that of cost. The nominal and each choice by itself are a few flights side by side; a slope at each of
+them leads, where the number is smooth, to a break with as many flights as there are dispersions, and the ends of single
+coordinates find what is far and hidden from slopes. What that misses, a Sobol plan over the whole set looks for, twice
+as large each time, with descents from its lowest flights.
 """
 
 from __future__ import annotations
@@ -16,11 +17,14 @@ from casadi_gnc.campaigns.plans import Sobol
 from casadi_gnc.tuning.descending import Effort, descend
 from casadi_gnc.tuning.flights import Flights, SpentError, Trial
 from casadi_gnc.tuning.reach import Reach
+from casadi_gnc.tuning.space import Space
 
 #: Flights of the first plan, at least.
 _PLAN = 16
 #: Descents after each plan.
 _DESCENTS = 3
+#: Choices, the nominal among them, of each of which a step downhill is taken.
+_BRANCHES = 8
 #: Choices are combined up to so many combinations.
 _MOST_COMBINED = 256
 
@@ -85,16 +89,48 @@ def _search(flights: Flights, reach: Reach, seed: int, effort: Effort) -> Trial 
             if lowest.broken:
                 return flights.note("choice", lowest)
         if changes == 1 and smooth:
-            starts = [nominal, min(known, key=lambda each: each.value)]
-            for start in dict.fromkeys(starts):
-                found = descend(flights, reach, _moved(flights, start), scale, seed, effort)
-                if found.broken:
-                    return found
+            found = _downhill(flights, reach, known, scale, seed, effort)
+            if found is not None:
+                return found
     if not choices:
-        found = descend(flights, reach, _moved(flights, nominal), scale, seed, effort)
-        if found.broken:
+        found = _downhill(flights, reach, known, scale, seed, effort)
+        if found is not None:
             return found
     return _planned(flights, reach, scale, seed, effort) if smooth else None
+
+
+def _downhill(
+    flights: Flights, reach: Reach, known: list[Trial], scale: float, seed: int, effort: Effort
+) -> Trial | None:
+    """Step downhill from the nominal and from each choice, fly the ends of each coordinate there, then descend.
+
+    Returns the first break, None without. A slope tells of what is near, the ends of what is far.
+    """
+    starts = [known[0], *sorted(known[1:], key=lambda each: each.value)][:_BRANCHES]
+    lower = []
+    for start in starts:
+        lower.append(descend(flights, reach, _moved(flights, start), scale, seed, effort, steps=1))
+        if lower[-1].broken:
+            return lower[-1]
+    ends = _ends(flights.space, reach)
+    for start in starts:
+        points = np.where(flights.space.discrete, start.point, ends)
+        lower.append(flights.best(start.of, points))
+        if lower[-1].broken:
+            return flights.note("end", lower[-1])
+    for start in sorted(lower, key=lambda each: each.value)[:_DESCENTS]:
+        found = descend(flights, reach, start, scale, seed, effort)
+        if found.broken:
+            return found
+    return None
+
+
+def _ends(space: Space, reach: Reach) -> np.ndarray:
+    """Return the points with one coordinate at its end and all others nominal, (2 (p - choices), p)."""
+    moved = np.flatnonzero(~space.discrete)
+    places, found = np.arange(len(moved)), np.tile(space.start, (2 * len(moved), 1))
+    found[places, moved], found[len(moved) + places, moved] = reach.ends[moved], -reach.ends[moved]
+    return reach.nearest(found)
 
 
 def _moved(flights: Flights, at: Trial) -> Trial:
@@ -115,14 +151,9 @@ def _each(flights: Flights, places: list[tuple[int, np.ndarray]]) -> list[Trial]
 
 
 def _planned(flights: Flights, reach: Reach, scale: float, seed: int, effort: Effort) -> Trial | None:
-    """Fly ends of single coordinates and a growing plan, and descend from its lowest flights, until one breaks."""
+    """Fly a growing plan, and descend from its lowest flights, until one breaks."""
     space = flights.space
-    moved = np.flatnonzero(~space.discrete)
-    middle = np.where(space.discrete, np.nan, space.start)
-    ends = np.tile(middle, (2 * len(moved), 1))
-    ends[np.arange(len(moved)), moved] = reach.ends[moved]
-    ends[len(moved) + np.arange(len(moved)), moved] = -reach.ends[moved]
-    told = _each(flights, [(0, point) for point in reach.nearest(ends)])
+    told: list[Trial] = []
     plan = Sobol(space.size + 1)
     first, last = 0, 2 ** int(np.ceil(np.log2(max(_PLAN, 2 * space.size))))
     begun: set[int] = set()
