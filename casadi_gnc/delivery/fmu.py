@@ -1,4 +1,4 @@
-"""Generate a functional mock-up unit (FMI 2.0, co-simulation) of a mission's controller."""
+"""Generate a functional mock-up unit (FMI 2.0 or 3.0, co-simulation) of a mission's controller."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ def generate_fmu(
     name: str | None = None,
     real: str = "float64",
     tunable: Sequence[str] = (),
+    fmi: int = 2,
 ) -> Path:
     """Write the controller of a scheme as an .fmu; return its path.
 
@@ -33,6 +34,7 @@ def generate_fmu(
     problem : a mission, a mission file, or the name of a shipped one.
     out : the file; flight/<name>.fmu by default. An existing unit is replaced, another file is not.
     scheme, name, real, tunable : as for `casadi_gnc.delivery.packaging.generate`; tunable gains become parameters.
+    fmi : version of the standard, 2 or 3.
 
     Raises
     ------
@@ -42,13 +44,15 @@ def generate_fmu(
     mission = sampled(mission_of(problem))
     if real not in REALS:
         raise PackageError(f"real is {real!r}, expected float64 or float32")
+    if fmi not in (2, 3):
+        raise PackageError(f"fmi is {fmi!r}, expected 2 or 3")
     options = Options(mission.name if name is None else name, REALS[real])  # type: ignore[arg-type]
     target = Path("flight") / f"{options.name}.fmu" if out is None else Path(out)
     if target.suffix != ".fmu" or target.is_dir():
         raise OutputError(f"{target} does not end in .fmu; name the file to write with --out")
     controller = describe(mission, scheme, tunable)
-    files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration)
+    files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration, fmi)
     prepare_folder(target.parent)
     with workshop() as shop:
-        write_beside(target, lambda place: fmu.pack(files, options, shop, place))
+        write_beside(target, lambda place: fmu.pack(files, options, shop, place, fmi))
     return target

@@ -1,4 +1,4 @@
-"""Wrap a package as a functional mock-up unit: FMI 2.0 co-simulation, sources and a binary for this machine."""
+"""Wrap a package as a functional mock-up unit: FMI 2.0 or 3.0 co-simulation, sources and a binary for this machine."""
 
 from __future__ import annotations
 
@@ -23,13 +23,14 @@ from casadi_gnc.system.templates import template
 _DATE = (1980, 1, 1, 0, 0, 0)
 
 
-def fmu_files(controller: Controller, options: Options, version: str, stop: float) -> dict[str, str]:
-    """Return `modelDescription.xml` and the sources: path in the archive -> text."""
+def fmu_files(controller: Controller, options: Options, version: str, stop: float, fmi: int = 2) -> dict[str, str]:
+    """Return `modelDescription.xml` and the sources: path in the archive -> text; `fmi` is 2 or 3."""
     package = flight_files(controller, options)
     sources = {path: text for path, text in package.items() if path.endswith((".c", ".h"))}
     guid = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:32]
     parameters = [place for one in controller.tunables for place in access_tunable(one, "")]
-    wrapper = template("fmu.c.j2").render(
+    wrapper = template("fmu.c.j2" if fmi == 2 else "fmi3.c.j2").render(
+        fmi=f"fmi{fmi}",
         name=options.name,
         title=controller.title,
         guid=guid,
@@ -39,7 +40,8 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
         outputs=access(controller.outputs, "output."),
         parameters=parameters,
     )  # fmt: skip
-    xml = template("fmu.xml.j2").render(
+    units = ["fmu.c", *(path for path in sources if path.endswith(".c"))]
+    xml = template("fmu.xml.j2" if fmi == 2 else "fmi3.xml.j2").render(
         name=options.name,
         title=controller.title,
         description=f"scheme {controller.scheme}{', ' + controller.source if controller.source else ''}",
@@ -47,11 +49,14 @@ def fmu_files(controller: Controller, options: Options, version: str, stop: floa
         version=version,
         period=repr(controller.period),
         stop=repr(stop),
-        sources=["fmu.c", *(path for path in sources if path.endswith(".c"))],
+        sources=units,
         variables=_variables(controller),
         units=sorted({one["unit"] for one in _variables(controller) if one["unit"]}),
     )
     files = {f"sources/{path}": text for path, text in {"fmu.c": wrapper, **sources}.items()}
+    if fmi == 3:
+        build = template("fmi3_build.xml.j2").render(name=options.name, sources=units)
+        files["sources/buildDescription.xml"] = build
     return {"modelDescription.xml": xml, **files, "documentation/LICENSE": package["LICENSE"]}
 
 
@@ -106,19 +111,18 @@ def _variable(
     }
 
 
-def platform_folder() -> str:
-    """Return the folder that FMI 2.0 names for binaries of this machine; raise `PackageError` if it names none."""
+def platform_folder(fmi: int = 2) -> str:
+    """Return the folder that FMI names for binaries of this machine; raise `PackageError` if it names none."""
     system = {"linux": "linux", "darwin": "darwin", "win32": "win"}.get(sys.platform)
-    if (
-        system is None
-        or sys.maxsize <= 2**32
-        or platform.machine().lower() not in ("x86_64", "amd64", "arm64", "aarch64")
-    ):
-        raise PackageError(f"FMI 2.0 names no folder for binaries of {platform.platform()}")
-    return f"{system}64"
+    processor = {"x86_64": "x86_64", "amd64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
+        platform.machine().lower()
+    )
+    if system is None or sys.maxsize <= 2**32 or processor is None:
+        raise PackageError(f"FMI {fmi}.0 names no folder for binaries of {platform.platform()}")
+    return f"{system}64" if fmi == 2 else f"{processor}-{'windows' if system == 'win' else system}"
 
 
-def pack(files: dict[str, str], options: Options, workshop: Path, target: Path) -> None:
+def pack(files: dict[str, str], options: Options, workshop: Path, target: Path, fmi: int = 2) -> None:
     """Compile the sources and write the archive.
 
     Raises
@@ -127,8 +131,8 @@ def pack(files: dict[str, str], options: Options, workshop: Path, target: Path) 
         Where there is no compiler, or it refuses the sources.
     """
     put(workshop, files)
-    compiler, folder = compilers.find(), platform_folder()
-    library = workshop / "binaries" / folder / f"{options.name}{'.dll' if folder == 'win64' else '.so'}"
+    compiler, folder = compilers.find(), platform_folder(fmi)
+    library = workshop / "binaries" / folder / f"{options.name}{'.dll' if sys.platform == 'win32' else '.so'}"
     library.parent.mkdir(parents=True)
     sources = [str(path) for path in sorted((workshop / "sources").glob("*.c"))]
     include = f"-I{workshop / 'sources'}"
