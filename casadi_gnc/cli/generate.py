@@ -21,6 +21,13 @@ class FormatChoice(str, Enum):
 
     package = "package"
     fmu = "fmu"
+    fmi2 = "fmi2"
+    fmi3 = "fmi3"
+    basilisk = "basilisk"
+    ros2 = "ros2"
+    freertos = "freertos"
+    timer = "timer"
+    simulink = "simulink"
 
 
 def generate(
@@ -35,7 +42,9 @@ def generate(
     real: Annotated[RealChoice, typer.Option(help="Type of every number.")] = RealChoice.float64,
     tunable: Annotated[str, typer.Option(help="Gains that stay variables of the C, apart by commas.")] = "",
     target: Annotated[str, typer.Option(help="Targets to measure for the README, apart by commas.")] = "",
-    format: Annotated[FormatChoice, typer.Option(help="C package, or FMI 2.0 co-simulation.")] = FormatChoice.package,
+    format: Annotated[
+        FormatChoice, typer.Option(help="C package, alone or with a frame for it; an FMI unit (fmu is fmi2).")
+    ] = FormatChoice.package,
     steps: Annotated[
         int | None, typer.Option(help="Samples that are shipped as test vectors; 1024 if left out.")
     ] = None,
@@ -60,12 +69,13 @@ def generate(
     from casadi_gnc.system.text import shell, terminal
 
     gains, boards = _words(tunable), _words(target)
-    if format is FormatChoice.fmu:
+    if format in (FormatChoice.fmu, FormatChoice.fmi2, FormatChoice.fmi3):
         from casadi_gnc.delivery.fmu import generate_fmu
 
         if state or ports or rate or vectors or commands or Path(problem).suffix == generating.ENDING:
             raise PackageError("a unit is made of a mission; leave out what is for others")
-        written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains)
+        fmi = 3 if format is FormatChoice.fmi3 else 2
+        written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains, fmi=fmi)
         typer.echo(terminal(f"wrote {written}"))
         return
     folder = Path("flight") / (name or Path(problem).stem) if out is None else out
@@ -84,6 +94,7 @@ def generate(
         rate=rate,
         vectors=vectors,
         commands=commands,
+        frame="" if format is FormatChoice.package else format.value,
     )
     scheme_of = f", scheme {about['scheme']}" if about["scheme"] else ""
     typer.echo(terminal(f"{about['title']}{scheme_of}, {about['real']}: wrote {folder}"))

@@ -38,6 +38,7 @@ def generate_allocator(
     commands: str | Path | None = None,
     target: Sequence[Any] = (),
     force: bool = False,
+    frame: str = "",
 ) -> dict[str, Any]:
     """Write the package of the on-board allocator for an allocation file; return what was made of what.
 
@@ -51,6 +52,7 @@ def generate_allocator(
         are shipped again, each with an actuator dead or stuck, and a few bad ones at the end.
     target : targets to measure for the README.
     force : overwrite a package that was edited.
+    frame : as for `casadi_gnc.delivery.packaging.generate`.
 
     Raises
     ------
@@ -62,7 +64,7 @@ def generate_allocator(
         raise PackageError(f"real is {real!r}, expected float64 or float32")
     case, document = load_allocation(problem), read(problem)
     thing, folder = making.flight_allocator(case), Path(out)
-    options = Options(case.name.lower() if name is None else name, REALS[real])  # type: ignore[arg-type]
+    options = Options(case.name.lower() if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target)
     package.check_room(folder, force)
     rows = _samples(thing, None if commands is None else read_commands(Path(commands), len(case.row_scale)))
@@ -71,6 +73,7 @@ def generate_allocator(
         "title": thing.title,
         "scheme": "",
         "real": real,
+        "frame": frame,
         "tunable": [],
         "targets": [board.name for board in boards],
         "steps": len(rows),

@@ -45,6 +45,7 @@ def generate_function(
     target: Sequence[Any] = (),
     steps: int | None = None,
     force: bool = False,
+    frame: str = "",
 ) -> dict[str, Any]:
     """Write the package of a function; return what was made of what.
 
@@ -62,6 +63,7 @@ def generate_function(
     target : targets to measure for the README.
     steps : how many, without `vectors`; 1024 by default.
     force : overwrite a package that was edited.
+    frame : as for `casadi_gnc.delivery.packaging.generate`.
 
     Raises
     ------
@@ -75,7 +77,7 @@ def generate_function(
         title, function = f"The function of {Path(function).name}", load_function(Path(function))
     own = flight_function.flight_function(function, state=state, ports=ports, rate=rate, title=title)
     thing, folder = PackableFunction(own), Path(out)
-    options = Options(function.name().lower() if name is None else name, REALS[real])  # type: ignore[arg-type]
+    options = Options(function.name().lower() if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target)
     package.check_room(folder, force)
     rows, spoiled = _given(own, vectors, steps)
@@ -85,6 +87,7 @@ def generate_function(
         "title": own.title,
         "scheme": "",
         "real": real,
+        "frame": frame,
         "tunable": [],
         "targets": [board.name for board in boards],
         "steps": len(rows),

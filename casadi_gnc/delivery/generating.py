@@ -36,6 +36,7 @@ def generate(
     rate: float | None = None,
     vectors: str | Path | np.ndarray | None = None,
     commands: str | Path | None = None,
+    frame: str = "",
 ) -> dict[str, Any]:
     """Write a flight package; return what was made of what.
 
@@ -51,6 +52,7 @@ def generate(
     force : overwrite a package that was edited.
     scheme, tunable : of a mission, as for `casadi_gnc.delivery.packaging.generate`.
     state, ports, rate, vectors : of a function, as for `casadi_gnc.delivery.functions.generate_function`.
+    frame : "basilisk", "ros2", "freertos", "timer", "simulink" or "xtce": files beside the package that put it there.
     commands : of an allocation file, as for `casadi_gnc.delivery.allocators.generate_allocator`.
 
     Raises
@@ -58,7 +60,7 @@ def generate(
     GncError
         Where something given is not right; the folder is left as it was.
     """
-    common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force}
+    common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force, "frame": frame}
     of_missions = {"scheme": scheme, "tunable": tunable}
     of_functions: dict[str, Any] = {"state": state, "ports": ports, "rate": rate, "vectors": vectors}
     if isinstance(thing, ca.Function) or (not isinstance(thing, Mission) and Path(thing).suffix == ENDING):

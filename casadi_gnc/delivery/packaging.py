@@ -13,8 +13,9 @@ from casadi_gnc.checking import numbers
 from casadi_gnc.delivery import making
 from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import boards as known_boards
-from casadi_gnc.embedded import package, targets
+from casadi_gnc.embedded import frames, package, targets
 from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.frames import package_files
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import MOST_STEPS
 from casadi_gnc.embedded.packable import Packable, PackableController
@@ -40,6 +41,7 @@ def generate(
     target: Sequence[Any] = (),
     steps: int = STEPS,
     force: bool = False,
+    frame: str = "",
 ) -> dict[str, Any]:
     """Write the package of one scheme of a mission; return what was made of what.
 
@@ -54,6 +56,7 @@ def generate(
     target : targets to measure for the README.
     steps : samples of the shipped flight.
     force : overwrite a package that was edited.
+    frame : of `casadi_gnc.embedded.frames.FRAMES`, what the package is put into besides.
 
     Raises
     ------
@@ -67,7 +70,7 @@ def generate(
         raise PackageError(f"steps is {steps}, expected more than {SPOILED}")
     if steps > MOST_STEPS:
         raise PackageError(f"steps is {steps}, expected at most {MOST_STEPS}: vectors are text in the package")
-    options = Options(mission.name if name is None else name, REALS[real])  # type: ignore[arg-type]
+    options = Options(mission.name if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target)
     package.check_room(folder, force)
     controller = describe(mission, scheme, tunable, monitored=True)
@@ -77,6 +80,7 @@ def generate(
         "title": controller.title,
         "scheme": controller.scheme,
         "real": real,
+        "frame": frame,
         "tunable": [one.name for one in controller.tunables],
         "targets": [board.name for board in boards],
         "steps": steps,
@@ -135,7 +139,7 @@ def pack(
     """
 
     def files_of(workshop: Path) -> dict[str, str]:
-        files = thing.files(options)
+        files = package_files(thing, options)
         package.put(workshop, {**files, "test/replay.h": thing.replay_header(options, about["steps"])})
         host = HostPackage(workshop, options.name)
         files |= thing.replay_files(options, *flown(host), about["spoiled"])
@@ -149,7 +153,7 @@ def pack(
             }
             for board in boards
         ]
-        files["README.md"] = readme(measured, (host.state_size, host.params_size))
+        files["README.md"] = readme(measured, (host.state_size, host.params_size)) + frames.note(options)
         files |= sources
         files[package.MANIFEST] = package.manifest(files, about)
         return files

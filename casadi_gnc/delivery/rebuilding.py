@@ -16,6 +16,7 @@ from casadi_gnc.delivery.packaging import REALS, warnings
 from casadi_gnc.delivery.vectors import WORDS, fly_package
 from casadi_gnc.embedded import compare, package
 from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.frames import package_files
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import digest
 from casadi_gnc.embedded.packable import Packable
@@ -65,8 +66,8 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
             f"the vectors have {width} numbers in and {height} out a sample, the controller has {expected[0]} and "
             f"{expected[1]}; generate the package again"
         )
-    options = Options(about["name"], REALS[about["real"]])  # type: ignore[arg-type]
-    files = made.files(options)
+    options = Options(about["name"], REALS[about["real"]], frame=about["frame"])  # type: ignore[arg-type]
+    files = package_files(made, options)
     files |= made.replay_files(options, inputs, outputs, about["spoiled"])
     package.put(shop / ANEW, files)
     host = HostPackage(shop / ANEW, options.name)

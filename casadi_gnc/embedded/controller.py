@@ -43,11 +43,13 @@ class Options:
     name : prefix of every symbol and file.
     real : type of every number.
     maths : "gnc" (the same words on every target); "libm" serves comparisons with CasADi only.
+    frame : what the package is put into besides, of `casadi_gnc.embedded.frames.FRAMES`; "" for nothing.
     """
 
     name: str
     real: Real = "double"
     maths: Math = "gnc"
+    frame: str = ""
 
     def __post_init__(self) -> None:
         check_package(self.name)

@@ -12,6 +12,7 @@ from casadi_gnc.allocation.online import OnlineSolver
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded import package
 from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry, bits, calls
 from casadi_gnc.embedded.members import elements
 from casadi_gnc.embedded.source import allocation_sizes, allocator_units, problem_tables
 from casadi_gnc.signals import Layout, Signal
@@ -27,6 +28,22 @@ STATUSES = {
 }
 #: Largest magnitude of a command: the squares of larger ones are no numbers, as in `casadi_gnc.allocation.allocator`.
 MOST = {"double": LARGEST, "float": 1e15}
+_NOTES = {
+    "command": "wanted effort",
+    "health": "of each actuator: 0 healthy, 1 dead, 2 stuck",
+    "held": "force of stuck actuators",
+    "force": "inside the bounds, always",
+    "objective": "cost of the forces",
+    "gap": "by how much it may exceed the least one",
+    "unallocated": "command less the nominal effort",
+    "worst_vertex": "of the uncertainty",
+    "saturation": "of each actuator",
+    "previous": "last forces",
+    "ready": "a pattern once it is initialised",
+    "lower": "least force",
+    "upper": "largest force",
+    "max_step": "largest change in one step",
+}
 #: What an actuator can be.
 HEALTHY, DEAD, STUCK = 0.0, 1.0, 2.0
 
@@ -75,6 +92,28 @@ class FlightAllocator:
         for name in ("gnc_arithmetic.h", *maths, "gnc_allocate.h", "gnc_allocate_internal.h"):
             files[name] = (runtime / name).read_text(encoding="utf-8")
         return {**files, "LICENSE": (assets.folder("codegen") / "LICENSE").read_text(encoding="utf-8")}
+
+    def dictionary(self, options: Options) -> Dictionary:
+        """Return what the package says of its numbers."""
+        n, r, real = self.problem.count, len(self.row_scale), {"double": "float64", "float": "float32"}[options.real]
+        given = [("command", r, "real"), ("health", n, "int32"), ("held", n, "real")]
+        answer = [("force", n, "real"), ("objective", 1, "real"), ("gap", 1, "real"), ("unallocated", r, "real")]
+        answer += [("worst_vertex", 1, "int32"), ("iterations", 1, "int32"), ("saturation", n, "int32")]
+        kept = [("previous", n, "real"), ("ready", 1, "uint32")]
+        limits = {"lower": self.problem.lower, "upper": self.problem.upper, "max_step": self.problem.max_step}
+
+        def members(rows: list[Any]) -> list[Entry]:
+            return [Entry(name, name, size, kind, note=_NOTES.get(name, "")) for name, size, kind in rows]
+
+        return Dictionary(
+            options.name, self.title, "", real, 0.0, calls(options.name, ", &params"), ("state", "params"),
+            tuple(members(given)), (*members(answer), STATUS), tuple(members(kept)),
+            tuple(
+                Entry(name, name, n, note=_NOTES[name], default=tuple(min(float(v), 1e30) for v in values))
+                for name, values in limits.items()
+            ),
+            bits(STATUSES),
+        )  # fmt: skip
 
     def about(self, options: Options) -> dict[str, Any]:
         """Return what header, source and README say."""

@@ -70,6 +70,7 @@ class Manifest(_Model):
     title: str
     scheme: str
     real: Literal["float64", "float32"]
+    frame: str = ""
     tunable: list[str]
     steps: Annotated[int, Field(gt=0, le=MOST_STEPS)]
     spoiled: Annotated[int, Field(ge=0, le=MOST_STEPS)]

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
-from casadi_gnc.embedded import function_source, package
+from casadi_gnc.embedded import flight_function, function_source, package
 from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry, bits, calls, entries
 from casadi_gnc.embedded.flight_function import FlightFunction
 from casadi_gnc.embedded.function_machine import FunctionMachine
 from casadi_gnc.embedded.machine import Machine
@@ -42,6 +43,10 @@ class Packable(Protocol):
         """Return the files that fly: path inside the package -> text."""
         ...
 
+    def dictionary(self, options: Options) -> Dictionary:
+        """Return what the package says of its numbers."""
+        ...
+
     def replay_header(self, options: Options, steps: int) -> str:
         """Return `test/replay.h`."""
         ...
@@ -63,6 +68,10 @@ class Packable(Protocol):
     def machine(self) -> str:
         """What that machine is called."""
         ...
+
+
+def _real(options: Options) -> str:
+    return {"double": "float64", "float": "float32"}[options.real]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +105,26 @@ class PackableController:
     def files(self, options: Options) -> dict[str, str]:
         """Return the files that fly."""
         return package.flight_files(self.own, options)
+
+    def dictionary(self, options: Options) -> Dictionary:
+        """Return what the package says of its numbers."""
+        own = self.own
+        state = [*entries(own.memory, "memory."), *entries(own.measured, "good.", "last good measurement")]
+        state += entries(own.actuators, "previous.", "last command")
+        return Dictionary(
+            options.name, own.title, own.scheme, _real(options), own.period, calls(options.name), ("state", "params"),
+            (Entry("time", "time", 1, "real", "s", "since the start of the mission"), *entries(own.measured)),
+            (*entries(own.outputs), STATUS),
+            (*state, Entry("started", "started", 1, "uint32", "", "0 until the first good measurement")),
+            tuple(
+                Entry(
+                    one.name, one.name, len(one.default), "real", one.unit, one.note,
+                    one.default, one.minimum, one.above,
+                )
+                for one in own.tunables
+            ),
+            bits(own.statuses),
+        )  # fmt: skip
 
     def replay_header(self, options: Options, steps: int) -> str:
         """Return `test/replay.h`."""
@@ -135,6 +164,22 @@ class PackableFunction:
     def files(self, options: Options) -> dict[str, str]:
         """Return the files that fly."""
         return function_source.function_files(self.own, options)
+
+    def dictionary(self, options: Options) -> Dictionary:
+        """Return what the package says of its numbers."""
+        own, name = self.own, options.name
+
+        def said(layout: Layout, owner: str = "") -> list[Entry]:
+            notes = {one: ", ".join(filter(None, (own.shape(one), own.notes.get(one)))) for one in layout.names}
+            return [replace(one, note=notes[one.name]) for one in entries(layout, owner)]
+
+        texts = {"init": f"{name}_init(&state)", "reset": "", "step": f"{name}_step(&state, &input, &output)"}
+        return Dictionary(
+            name, own.title, "", _real(options), own.period, texts, ("state",),
+            tuple(said(own.inputs)), (*said(own.outputs), STATUS),
+            (*said(own.state, "memory."), Entry("ready", "ready", 1, "uint32", "", "a pattern once it is initialised")),
+            (), bits(flight_function.STATUSES),
+        )  # fmt: skip
 
     def replay_header(self, options: Options, steps: int) -> str:
         """Return `test/replay.h`."""

@@ -27,7 +27,7 @@ def environment(markup: bool = False) -> jinja2.Environment:
     """Return the templates; `markup` for those that are XML or HTML."""
     codegen = assets.folder("codegen")
     made = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([codegen / "templates", codegen / "report"]),
+        loader=jinja2.FileSystemLoader([codegen / "templates", codegen / "frames", codegen / "report"]),
         undefined=jinja2.StrictUndefined,
         keep_trailing_newline=True,
         autoescape=markup,

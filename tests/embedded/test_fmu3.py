@@ -1,4 +1,4 @@
-"""A unit of FMI 3.0 flies in another tool, with the package's words. Truth: fmpy, its headers, the package's vectors."""
+"""A unit of FMI 3.0 flies in another tool with the package's words. Truth: fmpy, its headers, the vectors."""
 
 import re
 import subprocess

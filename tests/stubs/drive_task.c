@@ -1,0 +1,47 @@
+/* Runs the printed FreeRTOS task over the package's vectors: FreeRTOS is these few functions. */
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "FreeRTOS.h"
+#include "replay.h"
+#include "task.h"
+
+void sat_take(sat_input *input);
+void sat_give(const sat_output *output);
+void sat_refused(int32_t why);
+void sat_task(void *unused);
+extern volatile uint32_t sat_overruns;
+
+static long k, wrong, late;
+
+TickType_t xTaskGetTickCount(void) { return 7; }
+void vTaskDelete(TaskHandle_t task) { (void)task, exit(3); }
+void sat_refused(int32_t why) { (void)why; }
+
+BaseType_t xTaskDelayUntil(TickType_t *previous, TickType_t period)
+{
+    if (period != 100 || *previous != 7 + (TickType_t)(k - 1 + late) * period) exit(4);
+    *previous += period;
+    if ((k == 10 && late == 0) || (k == 20 && late < 3)) return late++, pdFALSE; /* one period missed, then two */
+    return pdTRUE;
+}
+
+void sat_take(sat_input *input) { replay_load(k, input); }
+
+void sat_give(const sat_output *output)
+{
+    replay_word found[REPLAY_OUTPUTS];
+    int i;
+    replay_store(output, found);
+    for (i = 0; i < REPLAY_OUTPUTS; i++) wrong += found[i] != replay_outputs[k][i];
+    if (++k == REPLAY_STEPS) {
+        (void)printf("%ld steps, %ld words differ, %u overruns\n", k, wrong, (unsigned)sat_overruns);
+        exit(0);
+    }
+}
+
+int main(void)
+{
+    sat_task(0);
+    return 5; /* a task never returns */
+}
