@@ -1,7 +1,8 @@
 """Write a problem file with other values: the text as it stands, comments and order, but for what is changed.
 
-A value that changes is written in its place, a key that the file has not, below the head of its table. Where a text
-cannot be changed so (a table in dots, say), the whole content is written anew, without its comments.
+A value that changes is written in its place, in a list or a table in one line too; a key that the file has not, below
+the head of its table. Where a text cannot be changed so (a table in dots, say), the whole content is written anew,
+without its comments.
 """
 
 from __future__ import annotations
@@ -12,11 +13,10 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from casadi_gnc.missions.craft import Craft
-from casadi_gnc.problem_files import toml_place
 from casadi_gnc.problem_files.changing import changed
 from casadi_gnc.problem_files.document import Document
+from casadi_gnc.problem_files.toml_spans import Key, Layout, layout_of
 
-Key = tuple[str | int, ...]
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -40,10 +40,35 @@ def rewritten(
     wanted = _without_none(changed(document.data, changes, craft))
     for name in leave_out:
         wanted.pop(name, None)
+    layout, edits, whole = layout_of(document.text), list[tuple[int, int, str]](), ""
+    for key in _apart(document.data, wanted, ()):
+        value = _at(wanted, key)
+        if key in layout.values:
+            edits.append((*layout.values[key], written(value)))
+        elif len(key) == 1 and isinstance(value, dict):
+            whole += f"\n\n[{_name(str(key[0]))}]\n{dumped(value, (str(key[0]),)).rstrip()}"
+        elif key[:-1] in layout.heads and isinstance(key[-1], str):
+            edits.append(_added(document.text, layout, key, value))
     text = document.text
-    for key in dict.fromkeys(_whole(text, key) for key in _apart(document.data, wanted, ())):
-        text = _put(text, key, wanted)
+    for begin, end, put in sorted(edits, reverse=True):
+        text = text[:begin] + put + text[end:]
+    text = f"{text.rstrip()}{whole}\n" if whole else text
     return text if _reads_as(text, wanted) else dumped(wanted)
+
+
+def _at(content: Any, key: Key) -> Any:
+    for part in key:
+        content = content[part]
+    return content
+
+
+def _added(text: str, layout: Layout, key: Key, value: Any) -> tuple[int, int, str]:
+    """Return (begin, end, what comes there) for a key that a table has not."""
+    at, pair = layout.heads[key[:-1]], f"{_name(str(key[-1]))} = {written(value)}"
+    if key[:-1] not in layout.values:
+        return at, at, f"{pair}\n"
+    others = text[at : layout.values[key[:-1]][1] - 1].strip()  # of { ... }
+    return at, at, f" {pair}," if others else f" {pair} "
 
 
 def _without_none(value: Any) -> Any:
@@ -66,64 +91,6 @@ def _apart(old: Any, new: Any, done: Key) -> Iterator[Key]:
             yield from _apart(one, other, (*done, i))
     elif type(old) is not type(new) or old != new:
         yield done
-
-
-def _whole(text: str, key: Key) -> Key:
-    """Return the longest part of a key that stands as a key of its own in the text; the key itself where none does."""
-    lines, places = text.splitlines(), toml_place.lines_of(text)
-    for length in range(len(key), 0, -1):
-        number = places.get(key[:length])
-        if number is not None and not lines[number - 1].lstrip().startswith("["):
-            return key[:length]
-        if number is not None:
-            break
-    return key
-
-
-def _put(text: str, key: Key, wanted: dict[str, Any]) -> str:
-    """Return the text with the value that is wanted at a key; as it was where no place for it is found."""
-    value: Any = wanted
-    for part in key:
-        value = value[part]
-    lines, places = text.splitlines(keepends=True), toml_place.lines_of(text)
-    number = places.get(key)
-    if number is not None and not lines[number - 1].lstrip().startswith("["):
-        start = sum(map(len, lines[: number - 1])) + lines[number - 1].index("=") + 1
-        start += len(text[start:]) - len(text[start:].lstrip(" \t"))
-        return text[:start] + written(value) + text[_end(text, start) :]
-    if len(key) == 1 and isinstance(value, dict):
-        return f"{text.rstrip()}\n\n[{_name(str(key[0]))}]\n{dumped(value, (str(key[0]),))}"
-    head = places.get(key[:-1])
-    if head is None or not isinstance(key[-1], str):
-        return text
-    at = sum(map(len, lines[:head]))
-    return f"{text[:at]}{_name(key[-1])} = {written(value)}\n{text[at:]}"
-
-
-def _end(text: str, start: int) -> int:
-    """Return where the value that begins at a place ends."""
-    depth, at = 0, start
-    while at < len(text):
-        for quotes in ('"""', "'''", '"', "'"):
-            if text.startswith(quotes, at):
-                at += len(quotes)
-                while at < len(text) and not text.startswith(quotes, at):
-                    at += 2 if quotes[0] == '"' and text[at] == "\\" else 1
-                at += len(quotes) - 1
-                break
-        else:
-            if text[at] in "[{":
-                depth += 1
-            elif text[at] in "]}":
-                depth -= 1
-            elif text[at] == "#" and depth:
-                at = text.find("\n", at)
-                if at < 0:
-                    return len(text)
-            elif depth == 0 and text[at] in "\n#":
-                return at - (len(text[start:at]) - len(text[start:at].rstrip()))
-        at += 1
-    return len(text.rstrip())
 
 
 def _reads_as(text: str, wanted: dict[str, Any]) -> bool:
