@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from casadi_gnc.status import StepStatus
     from casadi_gnc.tables.part import Part, table
     from casadi_gnc.tuning.falsifying import falsify
+    from casadi_gnc.tuning.tune import tune
 
 #: Where each name lives.
 _HOMES = {
@@ -79,6 +80,7 @@ _HOMES = {
     "sensitivities": "problem_files.by_name",
     "shipped": "problem_files.document",
     "table": "tables.part",
+    "tune": "tuning.tune",
     "vary": "problem_files.by_name",
     "verify": "delivery.verifying",
 }
@@ -123,6 +125,7 @@ __all__ = [
     "sensitivities",
     "shipped",
     "table",
+    "tune",
     "vary",
     "verify",
 ]

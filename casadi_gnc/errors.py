@@ -79,6 +79,10 @@ class FlightError(GncError):
     """Report a flight that cannot be flown as asked."""
 
 
+class TuningError(GncError):
+    """Report gains, a cost or constraints among which nothing can be sought."""
+
+
 class CampaignError(GncError):
     """Report a plan, a dispersion or a statistic of a campaign that cannot be had as asked."""
 

@@ -30,6 +30,7 @@ from casadi_gnc.cli import (
     reproduce,
     schema,
     synthesize,
+    tune,
     verify,
 )
 from casadi_gnc.errors import GncError
@@ -67,6 +68,7 @@ app.command("campaign")(campaign.campaign)
 app.command("falsify")(_about_its_file(falsify.falsify))
 app.command("check")(check.check)
 app.command("margins")(_about_its_file(margins.margins))
+app.command("tune")(_about_its_file(tune.tune))
 app.command("allocate")(_about_its_file(allocate.allocate))
 app.command("attainable")(_about_its_file(attainable.attainable))
 app.command("synthesize")(synthesize.synthesize)

@@ -92,15 +92,19 @@ class Objective:
         """Return the same for numbers as a file has them, (n, P)."""
         return self._told(self.table(rows))
 
-    def table(self, rows: np.ndarray) -> Columns:
+    def table(self, rows: np.ndarray, seeds: np.ndarray | None = None) -> Columns:
         """Return all that the flights of rows, (n, P), came to: the columns of a campaign's table, (n,) each.
 
         See `casadi_gnc.campaigns.result.Campaign` for their names. A row that cannot fly says why in `refused`.
+
+        Parameters
+        ----------
+        seeds : (n,), of the noise of each; by default all draw that of `seed`.
         """
         rows = np.ascontiguousarray(rows, dtype=float)
         count = len(rows)
         refused = self.cases.varied.refusals(rows)
-        seeds = np.full(count, self.seed, dtype=np.uint64)
+        seeds = np.full(count, self.seed, dtype=np.uint64) if seeds is None else np.asarray(seeds, dtype=np.uint64)
         drawn = Drawn(np.arange(count), rows, seeds, np.ones(count), refused)
         good = np.array([not why for why in refused], dtype=bool)
         if self._engine is None:

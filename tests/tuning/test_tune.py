@@ -1,0 +1,133 @@
+"""A tuning from the command to the file: what it promises is flown again here, by the virtual machine and NumPy."""
+
+import dataclasses
+import json
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+
+import casadi_gnc as gnc
+from casadi_gnc.errors import GncError
+from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load
+
+pytestmark = pytest.mark.slow
+
+MORE = """
+[[requirement]] # of the turn
+id = "ACS-1"
+formula = "always[20, 40](norm(mrp) <= 0.05)"
+
+[[requirement]]
+id = "ACS-2"
+metric = "largest_wheel_speed"
+at_most = 250.0
+
+[[dispersion]]
+key = "spacecraft.inertia_kg_m2.1.1"
+uniform = [70.0, 100.0]
+
+[[dispersion]]
+key = "initial.angle_deg"
+normal = { mean = 60.0, deviation = 5.0, truncate = 3.0 }
+"""
+
+
+@pytest.fixture(scope="module")
+def mission(tmp_path_factory):
+    """Return a slew of 40 s, its gains three times too small and three times too large."""
+    text = read("satellites/slew").text.replace("duration_s = 300.0", "duration_s = 40.0 # short")
+    text = text.replace("attitude_gain = 4.0, rate_gain = 18.0 }", "attitude_gain = 1.33, rate_gain = 54.0 } # detuned")
+    path = tmp_path_factory.mktemp("tuned") / "mission.toml"
+    path.write_text(text + MORE)
+    return path
+
+
+def run(*arguments):
+    program = [sys.executable, "-m", "casadi_gnc.cli.main", *arguments]
+    return subprocess.run(program, capture_output=True, text=True, timeout=300)
+
+
+def cost_flown(path):
+    """Return the time integral of the norm of the attitude, flown by CasADi's virtual machine."""
+    flight = gnc.fly(path, engine="vm", maths="libm", decimation=1)
+    return np.linalg.norm(flight["mrp"], axis=1).mean() * flight.time[-1]
+
+
+def test_the_command_writes_better_gains_and_says_what_moved(mission):
+    out, page = mission.with_name("nominal.toml"), mission.with_name("nominal.html")
+    done = run("tune", str(mission), "--free", "attitude_gain,rate_gain", "--cost", "integral(mrp)",
+               "--iterations", "8", "--threads", "1", "--out", str(out), "--report", str(page), "--json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    law = tomllib.loads(out.read_text())["scheme"][0]["law"]
+    assert {one["name"]: one["after"] for one in found["gains"]} == {key: law[key] for key in law if key != "type"}
+    assert all(float(f"{law[key]:.3g}") == law[key] for key in law if key != "type")
+    changed = [line for line in out.read_text().splitlines() if line not in mission.read_text().splitlines()]
+    assert len(changed) == 1
+    assert changed[0].endswith("# detuned")
+    before, after = cost_flown(mission), cost_flown(out)
+    assert found["terms"][0]["before"] == pytest.approx(before, rel=1e-9)
+    assert found["terms"][0]["after"] == pytest.approx(after, rel=1e-9)
+    assert before > 2 * after
+    assert found["disagreement"] < 1e-9
+    flights = [gnc.fly(path) for path in (mission, out)]
+    for one in found["requirements"]:
+        now = [flight.verdicts[one["name"]].robustness for flight in flights]
+        assert [one["before"], one["after"]] == pytest.approx(now, nan_ok=True)
+        assert (one["name"] in found["worse"]) == (now[1] < now[0])
+    bad = [{each.name for each in gnc.check(path) if each.verdict in ("warn", "fail")} for path in (mission, out)]
+    assert bad[1] <= bad[0]
+    assert not out.with_name("nominal.toml.journal").exists()
+    assert "Norm of mrp" in page.read_text()
+
+
+def test_the_worst_case_of_fresh_dispersions_is_better(mission):
+    """Of 200 cases of a campaign that the tuning never saw, the worst costs less than half of what it did."""
+    options = {"against": "worst", "cost": "integral(mrp)", "iterations": 8, "threads": 1}
+    found = gnc.tune(mission, ["attitude_gain", "rate_gain"], **options)
+    assert len(found.cases) > 1
+    attitude = gnc.Metric("attitude", "mean", "mrp", norm="two")
+    worst = []
+    for gains in ({}, found.values):
+        read_again = load(mission, gains)
+        measured = dataclasses.replace(read_again, metrics=[*read_again.metrics, attitude])
+        worst.append(max(gnc.campaign(measured, 200, seed=5).column("metric.attitude")) * 40.0)
+    assert worst[1] < 0.5 * worst[0]
+    # A search that draws and then climbs finds a case at least nearly as bad as the worst of 200 that are drawn.
+    assert found.terms[0].worst_after > 0.97 * worst[1]
+    assert found.terms[0].worst_before > found.terms[0].before
+
+
+def test_a_killed_run_goes_on_and_comes_to_the_same(mission):
+    class KilledError(Exception):
+        pass
+
+    def killed(sentence):
+        if sentence.startswith("iteration 3"):
+            raise KilledError
+
+    free, options = ["attitude_gain", "rate_gain"], {"cost": "integral(mrp)", "iterations": 5, "threads": 1}
+    whole = gnc.tune(mission, free, out=mission.with_name("whole.toml"), **options)
+    halves = mission.with_name("halves.toml")
+    with pytest.raises(KilledError):
+        gnc.tune(mission, free, out=halves, told=killed, **options)
+    assert not halves.exists()
+    told = []
+    again = gnc.tune(mission, free, out=halves, told=told.append, **options)
+    assert told[0] == "goes on after iteration 3"
+    assert (again.values, again.course) == (whole.values, whole.course)
+    assert again.flights < whole.flights
+    assert halves.read_bytes() == mission.with_name("whole.toml").read_bytes()
+
+
+def test_a_flat_cost_and_a_target_that_cannot_be_are_told(mission):
+    with pytest.raises(GncError, match="the cost is flat: rate_gain do not change it"):
+        gnc.tune(mission, ["rate_gain"], cost="reaching(mrp, 10)", threads=1)
+    with pytest.raises(GncError, match="is the problem file itself; write beside it"):
+        gnc.tune(mission, ["rate_gain"], out=mission)
+    with pytest.raises(GncError, match=r"expected a name that ends in \.toml"):
+        gnc.tune(mission, ["rate_gain"], out=mission.with_suffix(".txt"))

@@ -1,0 +1,161 @@
+"""What can be asked of a tuning: costs, gains, bounds, digits; and what is wrong with it, in one sentence."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import casadi_gnc as gnc
+from casadi_gnc.checks import Verdict
+from casadi_gnc.errors import GncError
+from casadi_gnc.laws.mrp_feedback import MrpFeedback
+from casadi_gnc.tuning.conditions import conditions_of, new_troubles
+from casadi_gnc.tuning.costs import cost_of, from_record
+from casadi_gnc.tuning.gains import gains_free
+
+
+@pytest.fixture(scope="module")
+def slew():
+    return gnc.load("satellites/slew")
+
+
+@pytest.fixture(scope="module")
+def funnel():
+    return gnc.load("huang2020/slew")
+
+
+@pytest.mark.parametrize(
+    ("text", "units"),
+    [
+        (None, ["- s", "N m s"]),
+        ("integral(rate) + 0.5 integral(achieved)", ["rad/s s", "N m s"]),
+        ("settling_time+2*largest_wheel_speed", ["s", "rad/s"]),
+        ("settling(rate, 1e-3) + peak(mrp) + 1e-2 mean(achieved)", ["s", "-", "N m"]),
+    ],
+)
+def test_terms_have_units(slew, text, units):
+    cost, mission = cost_of(text, slew, "pd")
+    assert [one.unit for one in cost.terms] == units
+    assert {one.column.partition(".")[2] for one in cost.terms} <= {one.name for one in mission.metrics}
+    assert cost_of(cost.text, slew, "pd")[0].text == cost.text
+
+
+def test_default_cost_of_a_craft_whose_rate_alone_is_regulated():
+    cost, _ = cost_of(None, gnc.load("huang2020/detumble"), "observer_pinv")
+    assert cost.text == "integral(rate) + 0.1 integral(achieved)"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("settling(rate)", r"settling\(rate\) has the threshold '', expected a number above 0"),
+        ("peak(rate, 3)", r"peak\(rate, 3\) has a threshold; only settling and reaching take one"),
+        ("integral(mpr)", "no signal 'mpr' is recorded; did you mean mrp"),
+        ("speed", "the mission has no metric 'speed'; there is settling_time, largest_wheel_speed"),
+        ("requirement(ACS-1)", "the mission has no requirement 'ACS-1'; there is none"),
+        ("integral(mrp) - 1", r"the cost 'integral\(mrp\) - 1' has the term"),
+        ("wobble(mrp)", r"a cost knows no wobble\(...\); there is integral, peak"),
+        ("", "the cost '' has the term ''"),
+    ],
+)
+def test_what_is_no_cost_is_told(slew, text, told):
+    with pytest.raises(GncError, match=told):
+        cost_of(text, slew, "pd")
+
+
+def test_value_of_each_kind_from_a_record(slew):
+    """Of |x| = 3, 2, 1, 0.5, 0.25 at 0 ... 4 s; the integral is the mean times the 4 s of the flight."""
+    time, signal = np.arange(5.0), np.array([3.0, -2.0, 1.0, -0.5, 0.25])
+    cost, _ = cost_of(
+        "integral(rate) + peak(rate) + least(rate) + final(rate) + settling(rate, 0.75) + reaching(rate, 1.5) + "
+        "mean(rate)", slew, "pd",
+    )  # fmt: skip
+    cost = [*cost.terms]
+    values = [from_record(one, time, signal, 4.0) for one in cost]
+    assert values[1:] == [3.0, 0.25, 0.25, 3.0, 2.0, 1.35]
+    never, _ = cost_of("settling(rate, 0.1)", slew, "pd")
+    assert from_record(never.terms[0], time, signal, 4.0) == pytest.approx(4.0 * 0.25 / 0.1)
+
+
+def test_gains_have_bounds_and_scales(slew):
+    found = gains_free(slew, "pd", ["attitude_gain", "rate_gain=2:30"])
+    assert [(one.low, one.high) for one in found.each] == [(0.4, 40.0), (2.0, 30.0)]
+    assert found.start == pytest.approx([math.log(4.0), math.log(18.0)])
+    assert found.values(np.array([found.low, found.high])) == pytest.approx(np.array([[0.4, 2.0], [40.0, 30.0]]))
+    mixed = gains_free(gnc.load("satellites/slew_and_track"), "mrp", ["integral_gain=0:0.1"])
+    assert mixed.values(mixed.start[None, :])[0, 0] == mixed.each[0].value
+
+
+def test_rounding_gives_both_sides_within_bounds(slew):
+    found = gains_free(slew, "pd", ["attitude_gain", "rate_gain=2:18.04"])
+    near = found.rounded(np.array([3.14159, 18.037]), 3)
+    assert sorted(map(tuple, near)) == [(3.14, 18.0), (3.15, 18.0)]
+    assert gains_free(slew, "pd", ["attitude_gain"]).rounded(np.array([4.0]), 2).tolist() == [[4.0]]
+
+
+@pytest.mark.parametrize(
+    ("free", "told"),
+    [
+        ([], "no gain is free"),
+        (["rate_gian"], "flies by AttitudePD, and 'rate_gian' is no gain of it; did you mean rate_gain"),
+        (["rate_gain=5:2"], "the bounds of rate_gain are '5:2', expected LOW:HIGH"),
+        (["rate_gain=a:b"], "the bounds of rate_gain are 'a:b', expected LOW:HIGH"),
+        (["rate_gain=0:20"], "the bounds of rate_gain begin at 0; the law asks for above 0"),
+        (["rate_gain=1:2"], "rate_gain is 18, outside its bounds from 1 to 2"),
+        (["rate_gain", "rate_gain"], "the gain rate_gain is named twice"),
+        (["rate_gain.2"], "leads nowhere"),
+    ],
+)
+def test_what_is_no_gain_is_told(slew, free, told):
+    with pytest.raises(GncError, match=told):
+        gains_free(slew, "pd", free)
+
+
+def test_a_gain_of_zero_needs_bounds():
+    with pytest.raises(GncError, match=r"integral_gain is 0, from which no scale follows; give its bounds"):
+        gains_free(gnc.load("satellites/slew").with_scheme(law=_mrp()), "pd", ["integral_gain"])
+
+
+def _mrp():
+    law = gnc.load("satellites/slew_and_track").scheme("mrp").law
+    assert isinstance(law, MrpFeedback)
+    return dataclasses.replace(law, integral_gain=0.0)
+
+
+def test_conditions_of_the_theorem_are_functions_of_the_gains(funnel):
+    """At gains that keep Theorem 1 and at others that do not, they hold where the law itself says that they do."""
+    gains = gains_free(funnel, "funnel_pinv", ["rate_gain", "observer_gain"])
+    found = conditions_of(funnel, "funnel_pinv", gains)
+    told = {one.name: one for one in funnel.scheme("funnel_pinv").law.checks()}
+    assert found.names == tuple(name for name, one in told.items() if one.holds)
+    for values in ([2.0, 27.0], [0.2, 1.0]):
+        other = funnel.with_scheme("funnel_pinv", rate_gain=values[0], observer_gain=values[1])
+        own = {one.name: one for one in other.scheme().law.checks()}
+        assert [m >= 0 for m in found.margins(np.array(values))] == [own[name].holds for name in found.names]
+
+
+def test_conditions_that_cannot_hold_together_are_named(funnel):
+    gains = gains_free(funnel, "funnel_pinv", ["rate_gain=1.9:2.1"])
+    with pytest.raises(GncError, match=r"gains\.theorem1\.filter cannot hold with rate_gain from 1\.9 to 2\.1"):
+        conditions_of(funnel, "funnel_pinv", gains, every=True)
+
+
+def test_options_are_told(slew):
+    each: tuple[tuple[dict[str, Any], str], ...] = (
+        ({"against": "worst"}, r"satellites/slew has no \[\[dispersion\]\]|slew has no \[\[dispersion\]\]"),
+        ({"against": "campaign"}, r"has neither a \[\[dispersion\]\] nor noise"),
+        ({"against": "luck"}, "against is 'luck', expected nominal, worst or campaign"),
+        ({"digits": 0}, "digits is 0, expected 1 to 17"),
+        ({"conditions": "some"}, "conditions is 'some', expected held or all"),
+    )
+    for options, told in each:
+        with pytest.raises(GncError, match=told):
+            gnc.tune(slew, ["rate_gain"], **options)
+
+
+def test_troubles_are_those_that_were_less_grave_before():
+    before: dict[str, Verdict] = {"a": "ok", "b": "warn", "c": "fail", "d": "note"}
+    after: dict[str, Verdict] = {"a": "warn", "b": "warn", "c": "ok", "d": "note", "e": "fail", "f": "ok"}
+    assert new_troubles(before, after) == ["a", "e"]
