@@ -163,8 +163,8 @@ def differences(
     values : from points, (n, p), to numbers, (n,).
     point : (p,), in standard units.
     step : in standard units.
-    value : the number at the point; where it is given, p differences of one side, else 2 p flights. At the end of a
-        coordinate a difference is of one side.
+    value : the number at the point; where it is given, p differences of one side, towards 0; else 2 p flights, of one
+        side at the end of a coordinate.
     """
     point = np.asarray(point, dtype=float)
     moved = np.flatnonzero(~(space.discrete | np.isnan(point)))
@@ -179,8 +179,8 @@ def differences(
         behind[places, moved] = np.maximum(point[moved] - step, space.low[moved])
         told = values(np.vstack([ahead, behind]))
         above, below = told[: len(moved)], told[len(moved) :]
-    else:  # away from the nearer end
-        ahead[places, moved] += np.where(point[moved] + step > space.high[moved], -step, step)
+    else:  # towards the middle, which no set that is searched leaves
+        ahead[places, moved] += np.where(point[moved] > 0, -step, step)
         above, below = values(ahead), np.full(len(moved), value)
     with np.errstate(invalid="ignore"):  # the difference of two numbers without end is none
         slope = (above - below) / (ahead - behind)[places, moved]

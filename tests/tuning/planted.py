@@ -32,8 +32,8 @@ class Planted:
     tables: dict[str, Any]
     over: dict[str, list[Any]] = field(default_factory=dict)
 
-    def write(self, file: Path) -> Path:
-        """Write the problem file; its requirement is P."""
+    def write(self, file: Path, seed: int = 0) -> Path:
+        """Write the problem file; its requirement is P, and `seed` is that of its noise."""
         document = read(self.base)
         kept = [each for each in document.data["scheme"] if each["name"] == self.scheme]
         data = {**document.data, "scheme": [*kept, *self.tables.get("scheme", [])]}
@@ -42,7 +42,7 @@ class Planted:
         one = document.with_data({**data, **tables})
         file.write_text(dumped(one.data), encoding="utf-8")
         again = read(file)
-        file.write_text(rewritten(again, self.changes, craft_of(again)), encoding="utf-8")
+        file.write_text(rewritten(again, {**self.changes, "noise.seed": seed}, craft_of(again)), encoding="utf-8")
         return file
 
 
@@ -55,6 +55,26 @@ def normal(key: str, mean: float, deviation: float, **more: float) -> dict[str, 
     """Return the table of a normal dispersion."""
     return {"key": key, "normal": {"mean": mean, "deviation": deviation, **more}}
 
+
+def alike(keys: list[str], mean: float, deviation: float) -> list[dict[str, Any]]:
+    """Return the tables of normal dispersions of one law."""
+    return [normal(key, mean, deviation) for key in keys]
+
+
+#: What else is not known of the wheel craft: it hardly matters.
+_OF_THE_WHEEL_CRAFT = [
+    *(normal(f"initial.mrp.{i}", mean, 0.01) for i, mean in enumerate((0.323, -0.194, 0.388), 1)),
+    *(normal(f"initial.rate_rad_per_s.{i}", mean, 2e-3) for i, mean in enumerate((-0.01, 0.02, -0.03), 1)),
+    *(normal(f"truth.inertia_kg_m2.{i}.{i}", mean, 0.2) for i, mean in enumerate((12.0, 14.0, 22.0), 1)),
+    *alike(["environment.harmonic.1.amplitude_N_m.1"], 0.005, 5e-4),
+    *alike(["environment.harmonic.2.amplitude_N_m.2"], -0.005, 5e-4),
+    *alike(["environment.harmonic.3.amplitude_N_m.3"], 0.006, 5e-4),
+    *(normal(f"environment.harmonic.{i}.frequency_rad_per_s", mean, 1e-3)
+      for i, mean in enumerate((0.02, 0.025, 0.04), 1)),
+    *(normal(f"environment.harmonic.{i}.phase_rad", mean, 0.1)
+      for i, mean in enumerate((1.5707963267948966, 1.5707963267948966), 1)),
+    normal("environment.orbit_rate_rad_per_s", 7.292115e-5, 1e-6),
+]  # fmt: skip
 
 _OBSERVER = {
     "name": "observer",
@@ -91,7 +111,7 @@ PLANTED = {
                     "key": "fault.1.effectiveness",
                     "choice": {"values": [1.0, 0.8, 0.3], "weights": [0.5, 0.495, 0.005]},
                 },
-                {"key": "initial.rate_rad_per_s", "uniform": [-0.02, 0.02]},
+                *_OF_THE_WHEEL_CRAFT,
             ],
         },
     ),
@@ -108,9 +128,13 @@ PLANTED = {
                 normal("spacecraft.chaser_mass_kg", 40.0, 3.6),
                 normal("spacecraft.target_mass_kg", 100.0, 10.0),
                 normal("believed.mass_kg", 20.0, 0.3),
-                normal("initial.position_m.1", 2.0, 0.02),
-                normal("initial.position_m.2", 3.0, 0.02),
-                normal("initial.position_m.3", 4.0, 0.02),
+                *(normal(f"initial.position_m.{i}", mean, 0.02) for i, mean in enumerate((2.0, 3.0, 4.0), 1)),
+                *(normal(f"environment.chaser.constant_N.{i}", m, 0.01) for i, m in enumerate((0.1, 0.15, 0.2), 1)),
+                *(normal(f"environment.target.constant_N.{i}", m, 0.01) for i, m in enumerate((0.1, 0.2, 0.3), 1)),
+                *(normal(f"fault.force_N.{i}", m, 0.01) for i, m in enumerate((0.08, 0.09, 0.04), 1)),
+                *(normal(f"sensors.position_error_m.{i}", m, 1e-5) for i, m in enumerate((4e-4, 5e-4, 6e-4), 1)),
+                normal("orbit.eccentricity", 0.15, 0.005),
+                normal("orbit.semi_major_axis_m", 1e7, 1e4),
             ],
         },
     ),
@@ -130,6 +154,16 @@ PLANTED = {
                 normal("environment.constant_torque_N_m.2", 2e-4, 1e-5),
                 normal("environment.constant_torque_N_m.3", -1e-4, 1e-5),
                 normal("initial.rate_rad_per_s", 0.0, 6e-4),
+                *(normal(f"initial.mrp.{i}", m, 1e-3) for i, m in enumerate((-0.206, -0.179, 0.075), 1)),
+                *(
+                    normal(f"environment.harmonic.1.amplitude_N_m.{i}", m, 1e-5)
+                    for i, m in enumerate((1e-4, 1.5e-4, 2e-4), 1)
+                ),
+                *(
+                    normal(f"environment.harmonic.2.amplitude_N_m.{i}", m, 1e-5)
+                    for i, m in enumerate((1.5e-4, -2e-4, -1.5e-4), 1)
+                ),
+                normal("environment.orbit_rate_rad_per_s", 1.1e-3, 1e-5),
             ],
         },
     ),
@@ -159,9 +193,7 @@ PLANTED = {
             "dispersion": [
                 normal("sensors.mrp_deviation", 1e-4, 1.5e-5),
                 normal("sensors.rate_deviation_rad_per_s", 1e-4, 1e-5),
-                normal("initial.mrp.1", 0.323, 0.01),
-                normal("initial.mrp.2", -0.194, 0.01),
-                normal("initial.mrp.3", 0.388, 0.01),
+                *_OF_THE_WHEEL_CRAFT,
             ],
         },
     ),
@@ -176,7 +208,14 @@ PLANTED = {
                 normal("spacecraft.inertia_kg_m2.1.1", 85.0, 3.0),
                 normal("spacecraft.inertia_kg_m2.2.2", 110.0, 3.0),
                 normal("spacecraft.inertia_kg_m2.3.3", 64.0, 3.0),
-                normal("initial.angle_deg", 10.0, 1.0),
+                normal("initial.angle_deg", 10.0, 0.5),
+                *(
+                    normal(f"spacecraft.inertia_kg_m2.{i}.{j}", m, 0.1)
+                    for i, j, m in ((1, 2, 2.0), (1, 3, -1.5), (2, 3, 1.0))
+                ),
+                *alike([f"wheel.{i}.viscous_N_m_s_per_rad" for i in range(1, 5)], 5e-6, 5e-7),
+                *alike([f"wheel.{i}.coulomb_N_m" for i in range(1, 5)], 1e-3, 1e-4),
+                *alike([f"scheme.pd.law.{key}" for key in ("attitude_gain",)], 4.0, 0.02),
             ],
         },
         {"timing.sample_period_s": [3.0, 6.0]},
