@@ -19,6 +19,8 @@ from casadi_gnc.tuning.reach import Reach
 
 #: Steps of differences, in standard units: a small one, and one for numbers that go in stairs.
 _STEPS = (0.02, 0.3)
+#: A coordinate whose slope is below this part of the largest tells nothing.
+_TELLING = 0.05
 #: Most steps of a descent.
 _MOST = 12
 #: Parts of the way to the linearised least, first alone and then together; the last where none of them is lower.
@@ -57,14 +59,18 @@ def descend(
     for number in range(steps):
         if now.broken:
             return now
-        slope = _slope(flights, now)
+        slope = _slope(flights, now, None if before is None else before[1])
         if slope is None:
             lower = _around(flights, reach, now, seed + number, effort)
         else:
+            partly = before is not None
             if before is not None:
                 inverse = _updated(inverse, now.point - before[0], slope - before[1])
             before = now.point, slope
             lower = _along(flights, reach, now, slope, inverse)
+            if lower is None and partly:
+                before = None  # with the whole slope once more
+                continue
             if lower is None:
                 lower, inverse, before = _around(flights, reach, now, seed + number, effort), np.eye(size), None
         if lower is None:
@@ -76,8 +82,17 @@ def descend(
     return now
 
 
-def _slope(flights: Flights, at: Trial) -> np.ndarray | None:
-    """Return the slope, of the smaller step that has one; None where it is flat, or a flight has no number."""
+def _slope(flights: Flights, at: Trial, before: np.ndarray | None) -> np.ndarray | None:
+    """Return the slope, of the smaller step that has one; None where it is flat, or a flight has no number.
+
+    After a step, coordinates that told nothing before keep their slope: it would cost as many flights to hear it again.
+    """
+    if before is not None:
+        telling = np.abs(before) > _TELLING * np.abs(before).max()
+        slope = flights.slope(at, _STEPS[0], telling)
+        slope = np.where(telling, slope, before)
+        if np.isfinite(slope).all() and slope[telling].any():
+            return slope
     for step in _STEPS:
         slope = flights.slope(at, step)
         if np.isfinite(slope).all() and slope.any():

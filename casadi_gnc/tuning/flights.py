@@ -163,9 +163,12 @@ class Flights:
         place = int(np.argmin(values))
         return Trial(of, np.asarray(points)[place], float(values[place]))
 
-    def slope(self, at: Trial, step: float) -> np.ndarray:
-        """Return the slope at a flight by differences of one side, (p,); NaN where a flight has no number."""
-        return differences(self.space, lambda points: self.fly(at.of, points), at.point, step, at.value)
+    def slope(self, at: Trial, step: float, only: np.ndarray | None = None) -> np.ndarray:
+        """Return the slope at a flight by differences of one side, (p,), 0 where it is not in `only`, a mask, (p,).
+
+        NaN where a flight has no number.
+        """
+        return differences(self.space, lambda points: self.fly(at.of, points), at.point, step, at.value, only)
 
     def note(self, did: str, at: Trial) -> Trial:
         """Put a flight on the search's path where it is lower than all before, or on the boundary; return it."""

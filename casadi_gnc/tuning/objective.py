@@ -152,6 +152,7 @@ def differences(
     point: Any,
     step: float = STEP,
     value: float | None = None,
+    only: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the slope of a number of flights at a point, (p,); NaN where a flight has no number.
 
@@ -165,9 +166,10 @@ def differences(
     step : in standard units.
     value : the number at the point; where it is given, p differences of one side, towards 0; else 2 p flights, of one
         side at the end of a coordinate.
+    only : (p,), which coordinates are asked for, the others 0; all by default.
     """
     point = np.asarray(point, dtype=float)
-    moved = np.flatnonzero(~(space.discrete | np.isnan(point)))
+    moved = np.flatnonzero(~(space.discrete | np.isnan(point)) & (True if only is None else only))
     found = np.zeros(space.size)
     if not len(moved):
         return found

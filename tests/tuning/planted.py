@@ -153,7 +153,7 @@ PLANTED = {
                 normal("environment.constant_torque_N_m.1", 1e-4, 1e-5),
                 normal("environment.constant_torque_N_m.2", 2e-4, 1e-5),
                 normal("environment.constant_torque_N_m.3", -1e-4, 1e-5),
-                normal("initial.rate_rad_per_s", 0.0, 6e-4),
+                normal("initial.rate_rad_per_s", 0.0, 5e-4),
                 *(normal(f"initial.mrp.{i}", m, 1e-3) for i, m in enumerate((-0.206, -0.179, 0.075), 1)),
                 *(
                     normal(f"environment.harmonic.1.amplitude_N_m.{i}", m, 1e-5)
@@ -183,7 +183,7 @@ PLANTED = {
                 {
                     "signal": "mrp",
                     "start": [1.0, 1.0, 1.0],
-                    "floor": [5.1e-4, 5.1e-4, 5.1e-4],
+                    "floor": [4.9e-4, 4.9e-4, 4.9e-4],
                     "decay_per_s": [0.2, 0.2, 0.2],
                     "below": [1.0, 1.0, 1.0],
                     "above": [1.0, 1.0, 1.0],
