@@ -58,23 +58,23 @@ class Build:
         return np.full(len(rows), math.nan)
 
     def _at(self, rows: np.ndarray) -> np.ndarray:
-        """Return the numbers of flights; none where a law cannot have its gains at its sample period, as in a file."""
+        """Return the numbers of flights; none where a file of that row would be refused."""
         varied = self.objective.cases.varied
         found = np.full(len(rows), math.nan)
-        able = np.ones(len(rows), dtype=bool)
-        if any(key.startswith("scheme.") for key in varied.parameters.keys):
-            able = np.array([_holds(varied, row) for row in rows], dtype=bool)
+        able = np.array([_holds(varied, row) for row in rows], dtype=bool)
         if able.any():
             found[able] = self.objective.at(rows[able])
         return found
 
 
 def _holds(varied: Varied, row: np.ndarray) -> bool:
+    """Return whether a craft with these numbers has no flaw, and its law can have them at its sample period."""
     try:
-        varied.at(row).schemes[0].law.check_hold()
+        made = varied.at(row)
+        made.schemes[0].law.check_hold()
     except GncError:
         return False
-    return True
+    return not list(made.craft.flaws())
 
 
 @dataclass(frozen=True, eq=False)

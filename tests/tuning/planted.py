@@ -127,7 +127,6 @@ PLANTED = {
             "dispersion": [
                 normal("spacecraft.chaser_mass_kg", 40.0, 3.6),
                 normal("spacecraft.target_mass_kg", 100.0, 10.0),
-                normal("believed.mass_kg", 20.0, 0.3),
                 *(normal(f"initial.position_m.{i}", mean, 0.02) for i, mean in enumerate((2.0, 3.0, 4.0), 1)),
                 *(normal(f"environment.chaser.constant_N.{i}", m, 0.01) for i, m in enumerate((0.1, 0.15, 0.2), 1)),
                 *(normal(f"environment.target.constant_N.{i}", m, 0.01) for i, m in enumerate((0.1, 0.2, 0.3), 1)),
