@@ -28,6 +28,7 @@ class FormatChoice(str, Enum):
     freertos = "freertos"
     timer = "timer"
     simulink = "simulink"
+    xtce = "xtce"
 
 
 def generate(

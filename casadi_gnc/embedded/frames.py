@@ -7,7 +7,9 @@ outputs on, in the words of the frame; no number is computed there.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from casadi_gnc.embedded import packets
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.dictionary import DICTIONARY, Dictionary
 from casadi_gnc.embedded.packable import Packable
@@ -50,7 +52,11 @@ FRAMES = {
         {"{name}_sfun.c": "simulink_sfun.c.j2"},
         f"A level-2 S-function in C: a port for each input and output, its state in work vectors. {_UNTESTED}",
     ),
-}  # fmt: skip
+    "xtce": Frame(
+        {"{name}.xml": "xtce.xml.j2", "{name}_telemetry.h": "telemetry.h.j2", "{name}_telemetry.c": "telemetry.c.j2"},
+        "The structs of this package as space packets (CCSDS 133.0-B): their definition in XTCE 1.2, and a packer in C.",
+    ),
+}
 
 
 def package_files(thing: Packable, options: Options) -> dict[str, str]:
@@ -75,8 +81,10 @@ def frame_files(kind: str, about: Dictionary, files: list[str]) -> dict[str, str
             f"a frame of {kind} needs a period, and {about.name} has none; a function gets one by --rate"
         )
     units = [path for path in files if path.endswith(".c")]
-    given = {"about": about, "name": about.name, "NAME": about.name.upper(), "units": units}
+    given: dict[str, Any] = {"about": about, "name": about.name, "NAME": about.name.upper(), "units": units}
     given["reals"] = "double" if about.real == "float64" else "float"
+    if kind == "xtce":
+        given["packets"], given["types"] = packets.layout(about)
     return {
         f"{kind}/{path.format(name=about.name)}": template(source).render(**given)
         for path, source in FRAMES[kind].files.items()

@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from packages import copied, made, run
+from packages import run
 
 import casadi_gnc
+from casadi_gnc.delivery.packaging import generate
 from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import compare, package
 from casadi_gnc.embedded.controller import Options
@@ -66,6 +67,7 @@ DEVIATIONS = {
     "2.4": "the tags of the enumerations name what the constants are for",
     "2.5": "the period is a macro for the caller",
     "20.5": "#undef lets the header of a second controller give the allocator other sizes",
+    "21.15": "the bits of a number are read by memcpy, as the rules of aliasing allow",
     "8.7": "configure and init are for the caller, who is not in the package",
 }
 
@@ -75,13 +77,16 @@ DEVIATIONS = {
 def test_generated_code_keeps_the_misra_rules(real, tmp_path):
     """cppcheck's MISRA C:2012 add-on on what we generate; the files of the runtime have their own gate."""
     gains = ("rate_gain", "observer_gain")
-    folder = copied(made("huang2020/detumble", "observer_robust", real, gains, steps=64), tmp_path)
+    folder = tmp_path / "detumble"
+    generate("huang2020/detumble", folder, scheme="observer_robust", real=real, tunable=gains, steps=64, frame="xtce")
     done = run(
         "cppcheck", "--addon=misra", "--std=c99", "--quiet", "--enable=warning,style,performance,portability",
         "--suppress=missingIncludeSystem", "-DUINT64_C(c)=c##ULL", "-DUINT32_C(c)=c##U",
-        "--template={file}:{line}: {id}: {message}", "detumble.c", folder=folder,
+        "--template={file}:{line}: {id}: {message}", "-I.", "detumble.c", "xtce/detumble_telemetry.c",
+        folder=folder,
     )  # fmt: skip
-    findings = re.findall(r"^(detumble\.[ch]):(\d+): ([\w.-]+): ", done.stdout + done.stderr, re.MULTILINE)
+    told = done.stdout + done.stderr
+    findings = re.findall(r"^(?:xtce/)?(detumble\w*\.[ch]):(\d+): ([\w.-]+): ", told, re.MULTILINE)
     strange = [found for found in findings if found[2].removeprefix("misra-c2012-") not in DEVIATIONS]
     assert done.returncode == 0
     assert findings  # the add-on really ran: a deviation is always found
