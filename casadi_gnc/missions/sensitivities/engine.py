@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.allocation import OnlineInFlight
+from casadi_gnc.missions.engines import build_options
 from casadi_gnc.missions.parameters import Varied
 from casadi_gnc.missions.sensitivities.text import asked_tape, sensitivities_source
 from casadi_gnc.system import assets, compilers
@@ -51,8 +53,13 @@ class DerivativeEngine:
     def __init__(self, varied: Varied, quantities: ca.Function, compiler: compilers.Compiler | None = None) -> None:
         tape = asked_tape(varied, quantities)
         self.source = sensitivities_source(varied, tape)
-        include = assets.folder("codegen") / "runtime"
-        self._c = compilers.load(self.source, include=include, flags=_FLAGS, compiler=compiler)
+        include, allocator = assets.folder("codegen") / "runtime", varied.scheme.actuation.allocator
+        flags, units, self._data, self._workspace = _FLAGS, (), np.zeros(0), 0
+        if isinstance(allocator, OnlineInFlight):
+            (flags, units), found = build_options(varied.scheme, "gnc"), allocator.solver(compiler)
+            self._data, self._workspace = found.contents
+            flags = (*flags, *_FLAGS[1:])
+        self._c = compilers.load(self.source, include=include, flags=flags, units=units, compiler=compiler)
         self._c.gnc_sizes.restype = ctypes.c_long
         self._carried, self._tangent, self._adjoint, self._kept = (int(self._c.gnc_sizes(i)) for i in range(4))
         self._samples, self._asked = varied.mission.timing.samples, tape.numel_out(0)
@@ -66,7 +73,7 @@ class DerivativeEngine:
         case = _Point(self, p, seed)
         asked, begins, kept = np.zeros((self._samples, self._asked)), [], np.zeros((0, self._kept))
         for first, count in self._parts:
-            begins.append(case.carried.copy())
+            begins.append(case.state.copy())
             kept = self._fly(case, first, count, asked[first : first + count], keep=first + count == self._samples)
         return Flown(asked, case.carried[: self._states].copy(), begins, kept)
 
@@ -107,7 +114,7 @@ class DerivativeEngine:
         for (first, count), begin in zip(reversed(self._parts), reversed(flown.begins), strict=True):
             kept = flown.kept
             if first + count < self._samples:
-                case.carried[:] = begin
+                case.state[:] = begin
                 kept = self._fly(case, first, count, np.zeros((count, self._asked)), keep=True)
             self._c.gnc_adjoint(
                 ctypes.byref(case.c), at(kept), ctypes.c_long(first), ctypes.c_long(count), at(weights[first:]),
@@ -124,9 +131,12 @@ class _Point:
     def __init__(self, engine: DerivativeEngine, p: np.ndarray, seed: int) -> None:
         self.p = np.ascontiguousarray(p, dtype=float)
         self.seeds = np.array([seed], dtype=np.uint64)
-        self.derived, self.carried = np.zeros(max(1, engine._derived)), np.zeros(engine._carried)
+        self.derived = np.zeros(max(1, engine._derived))
+        #: What goes from sample to sample: what the C carries, and the workspace of the on-board solver.
+        self.state = np.zeros(engine._carried + engine._workspace)
+        self.carried, work = np.split(self.state, [engine._carried])
         engine._c.gnc_begin(at(self.p), at(self.seeds), at(self.derived), at(self.carried))
-        self.c = _Case(self.derived.ctypes.data, self.seeds.ctypes.data, None, None)
+        self.c = _Case(self.derived.ctypes.data, self.seeds.ctypes.data, engine._data.ctypes.data, work.ctypes.data)
 
 
 def at(array: np.ndarray) -> ctypes.c_void_p:

@@ -19,9 +19,7 @@ from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.sensitivities.engine import DerivativeEngine
 from casadi_gnc.missions.sensitivities.outcomes import Weighed, outcome_of
 
-Method = Literal["auto", "tangents", "adjoint"]
-#: Parameters from which on one way back costs less than so many directions.
-_MANY = 12
+Method = Literal["adjoint", "tangents"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +81,7 @@ class Sensitivities:
         values: Mapping[str, Any] | None = None,
         *,
         temperature: float = 0.0,
-        method: Method = "auto",
+        method: Method = "adjoint",
         seed: int | None = None,
     ) -> Sensitivity:
         """Fly with some values, and return the number and its gradient.
@@ -92,7 +90,8 @@ class Sensitivities:
         ----------
         values : by key, as for `OneBuild.fly`; those that are not given are the file's.
         temperature : of the smooth companion, unit of the number; 0 for the number itself.
-        method : "tangents", all parameters along with the flight; "adjoint", one way back, whatever their number.
+        method : "adjoint", one way back, whatever the number of parameters; "tangents", all of them along with the
+            flight.
         seed : of the noise; the mission's own by default.
 
         Raises
@@ -107,13 +106,13 @@ class Sensitivities:
         return self.at_row(row, temperature=temperature, method=method, seed=seed)
 
     def at_row(
-        self, row: np.ndarray, *, temperature: float = 0.0, method: Method = "auto", seed: int | None = None
+        self, row: np.ndarray, *, temperature: float = 0.0, method: Method = "adjoint", seed: int | None = None
     ) -> Sensitivity:
         """Return the same of a number for every parameter, (P,), which are not looked at again."""
         if not (math.isfinite(temperature) and temperature >= 0):
             raise FlightError(f"the temperature is {temperature:g}, expected 0 or a positive number")
-        if method not in ("auto", "tangents", "adjoint"):
-            raise FlightError(f"method is {method!r}, expected 'auto', 'tangents' or 'adjoint'")
+        if method not in ("adjoint", "tangents"):
+            raise FlightError(f"method is {method!r}, expected 'adjoint' or 'tangents'")
         p = np.array(row, dtype=float)
         noise = self.varied.nominal.noise.seed if seed is None else seed
         flown = self._engine.values(p, noise)
@@ -128,12 +127,12 @@ class Sensitivities:
     def _gradient(self, p: np.ndarray, seed: int, weighed: Weighed, flown: Any, method: Method) -> np.ndarray:
         if not weighed.weights.any():
             return np.zeros(len(p))
-        if method == "adjoint" or (method == "auto" and len(p) > _MANY):
+        if method == "adjoint":
             return self._engine.adjoint(p, seed, weighed.weights, flown)
         return self._engine.tangents(p, seed, weighed.weights, np.eye(len(p)))
 
     def at_rows(
-        self, rows: np.ndarray, *, threads: int = 1, temperature: float = 0.0, method: Method = "auto"
+        self, rows: np.ndarray, *, threads: int = 1, temperature: float = 0.0, method: Method = "adjoint"
     ) -> list[Sensitivity]:
         """Return those of many rows, (n, P), on threads."""
         with ThreadPoolExecutor(max(1, threads)) as pool:

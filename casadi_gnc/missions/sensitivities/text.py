@@ -68,14 +68,16 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
     """
     mission, scheme, tapes = varied.mission, varied.scheme, varied.tapes
     plant, timing, allocator = mission.truth, mission.timing, scheme.actuation.allocator
-    if not tapes.symbolic:
+    online = isinstance(allocator, OnlineInFlight)
+    if not tapes.symbolic and not online:
         raise FlightError(
-            f"scheme {scheme.name!r} allocates by {type(allocator).__name__}, which has no derivatives here; take "
-            'allocation by "pinv"'
+            f"scheme {scheme.name!r} allocates by {type(allocator).__name__}, which is called from Python and has no "
+            'derivatives; take allocation by "pinv", or by "robust" with the on-board solver'
         )
     functions = {**tapes.functions, "ask": asked}
     control = ["stage"] if "stage" in functions else ["sense", "before", "allocate"]
-    whole = [*control, "ask", "settle", "configure", "sense", "start"]
+    control += ["flow"] if "flow" in functions else []
+    whole = [*(name for name in control if name in functions), "ask", "settle", "configure", "sense", "start"]
     whole += ["after", "rate"] if timing.mode == "sampled" else []
     whole = list(dict.fromkeys(whole))
     made = {name: linearised(functions[name], STILL) for name in whole}
@@ -91,7 +93,7 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
     return template("sensitivities.c.j2").render(
         title=f"{mission.name}, scheme {scheme.name}",
         mode=timing.mode,
-        online=isinstance(allocator, OnlineInFlight),
+        online=online,
         states=plant.state.size,
         measurements=plant.measurement.size,
         memory=scheme.flown.memory.size,
