@@ -1,8 +1,8 @@
 """Time tangents and adjoints of whole flights in ordinary flights of scalar C, one thread, in one run.
 
-An ordinary flight is one of a campaign: tally and all, no record. Both ways fly first to learn what counts. Processor time
-counts, the least of several runs; nothing that is built once is timed. Fails where tangents of p parameters cost more than
-1 + p flights (p of 4 and more), or an adjoint more than 6; `--json FILE` writes the same numbers.
+An ordinary flight is one of a campaign: tally and all, no record. Both ways fly first to learn what counts. Processor
+time counts, the least of several runs; nothing that is built once is timed. Fails where tangents of p parameters cost
+more than 1 + p flights (p of 4 and more), or an adjoint more than 6; `--json FILE` writes the same numbers.
 """
 
 import argparse

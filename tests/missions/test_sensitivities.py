@@ -4,20 +4,31 @@ Truths: differences of the values themselves, extrapolated (Richardson), and wha
 """
 
 import itertools
+import sys
+from importlib import import_module
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
+from mpmath import mp
 
 import casadi_gnc
+from casadi_gnc.allocation.online import OnlineSolver
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.linearised import linearised
 from casadi_gnc.mathematics.soft import slack, soft_maximum, soft_minimum
+from casadi_gnc.missions.one_build import OneBuild
+from casadi_gnc.missions.parameters import vary
 from casadi_gnc.missions.requirements import Requirement, evaluating
 from casadi_gnc.missions.scheme import Metric
+from casadi_gnc.missions.sensitivities.engine import DerivativeEngine
 from casadi_gnc.missions.sensitivities.outcomes import _OfMetric
 from casadi_gnc.missions.sensitivities.robustness import weighed_robustness
 from casadi_gnc.signals import Layout, Signal
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "oracles"))
+long_double_flight = import_module("long_double_flight")
 
 X = ca.SX.sym("x", 3)
 #: Every operation that a tape may have, at a point where it is smooth.
@@ -129,6 +140,154 @@ def test_metrics_count_their_samples(kind, norm):
         direction = rng.standard_normal(asked.shape)
         slope = richardson(lambda a, T=temperature: outcome.weigh(a, T).value, asked, direction, 1e-6)[0]
         assert float((found.weights * direction).sum()) == pytest.approx(slope, rel=1e-5, abs=1e-7)
+
+
+def flown(name, scheme, keys, samples=1000):
+    """Return short flights, an engine that asks for all states and actuators, and weights for each of their numbers."""
+    mission = casadi_gnc.load(name.removesuffix(" continuous"), strict=False)
+    mode = "continuous" if name.endswith("continuous") else mission.timing.mode
+    short = mission.with_timing(duration=mission.timing.sample_period * samples, record_every=1, mode=mode)
+    varied = vary(short, keys, scheme)
+    layout = varied.tapes.row
+    row = layout.symbol("row")
+    efforts = varied.scheme.actuation.named("limited").names
+    names = (*short.truth.state.names, *efforts, *short.truth.inputs.names)
+    places = [i for name in names for i in range(*layout.place(name).indices(layout.size))]
+    engine = DerivativeEngine(varied, ca.Function("quantities", [row], [row[places]]))
+    record = OneBuild(varied).fly_row(varied.parameters.nominal, mission.noise.seed, decimation=1).samples[:, places]
+    sizes = np.abs(record).max(axis=0)
+    weights = np.random.default_rng(0).standard_normal(record.shape) / np.where(sizes > 0, sizes, 1)
+    return varied, engine, places, record, weights
+
+
+#: Of the other missions, which take longer to build.
+MORE = {
+    "tao2019/case1": ("funnels", ["initial.position_m"]),
+    "sun2018/circular_orbit": ("tracking", ["initial.position_m"]),
+    "shi2020/docking": ("iobc", ["initial.*"]),
+    "huang2020/slew": ("funnel_pinv", ["initial.rate_rad_per_s", "scheme.funnel_pinv.law.rate_gain"]),
+    "satellites/slew": ("pd", ["initial.axis", "initial.angle_deg"]),
+}
+#: Schemes whose allocation is an expression, in both modes, and what they are differentiated by.
+FLIGHTS = {
+    "huang2020/detumble": ("observer_pinv", ["initial.rate_rad_per_s", "scheme.observer_pinv.law.rate_gain"]),
+    "huang2020/detumble continuous": ("damping_pinv", ["initial.rate_rad_per_s", "truth.inertia_factor"]),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*FLIGHTS, *(pytest.param(one, marks=pytest.mark.long) for one in MORE)])
+def test_tangents_and_adjoints_of_the_first_1000_samples(name):
+    """Truth: differences of the same flight in long double, extrapolated, of steps in which no decision turns."""
+    scheme, keys = (FLIGHTS | MORE)[name]
+    varied, engine, places, record, weights = flown(name, scheme, keys)
+    p, seed = varied.parameters.nominal, varied.nominal.noise.seed
+    found = engine.values(p, seed)
+    assert np.array_equal(found.asked, record)  # word for word
+    back = engine.adjoint(p, seed, weights, found)
+    np.testing.assert_allclose(engine.tangents(p, seed, weights, np.eye(len(p))), back, rtol=1e-9, atol=1e-12)
+    if not long_double_flight.FINER:
+        pytest.skip("long double is no finer than double here")
+    finer = long_double_flight.LongDoubleFlights(varied)
+    for i, direction in enumerate(np.eye(len(p), dtype=np.longdouble)):
+        slopes = [
+            float(richardson(
+                lambda at: (weights * finer.record(at, seed)[:, places]).sum(), p, direction, np.longdouble(step)
+            )[0])
+            for step in max(abs(p[i]), 1e-3) * np.array([1e-7, 1e-8, 1e-9])
+        ]  # fmt: skip
+        assert min(abs(back[i] / slope - 1) for slope in slopes) < 1e-6, varied.parameters.keys[i]
+
+
+ROBUST = ["initial.rate_rad_per_s", "scheme.funnel_robust.law.rate_gain"]
+
+
+@pytest.mark.slow
+def test_through_the_on_board_allocator():
+    """Truth: differences of the flight itself over 1000 samples; its allocator rounds as double does."""
+    varied, engine, _, record, weights = flown("huang2020/slew", "funnel_robust", ROBUST)
+    p, seed = varied.parameters.nominal, varied.nominal.noise.seed
+    found = engine.values(p, seed)
+    assert np.array_equal(found.asked, record)
+    back = engine.adjoint(p, seed, weights, found)
+    np.testing.assert_allclose(engine.tangents(p, seed, weights, np.eye(len(p))), back, rtol=1e-8)
+    for i, direction in enumerate(np.eye(len(p))):
+        slopes = [
+            richardson(lambda at: (weights * engine.values(at, seed).asked).sum(), p, direction, step)[0]
+            for step in max(abs(p[i]), 1e-3) * np.array([1e-1, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5])
+        ]
+        assert min(abs(back[i] / slope - 1) for slope in slopes) < 2e-5, varied.parameters.keys[i]
+
+
+def exact_forces(problem, command, box, raw):
+    """Return the forces that solve the optimality conditions on the sets of an answer, from rest, to 30 digits."""
+    mp.dps = 30
+    weights = [v for v, weight in enumerate(raw.weights) if weight > 1e-9]
+    held = [force in (low, high) for force, low, high in zip(raw.forces, *box, strict=True)]
+    free = [i for i, fixed in enumerate(held) if not fixed]
+    B = [mp.matrix(problem.effectiveness + problem.errors[v] @ problem.coupling) for v in weights]
+    h, q = mp.mpf(problem.accuracy_weight), problem.effort_weight + problem.change_weight
+    F, w = mp.matrix(raw.forces), mp.matrix([raw.weights[v] for v in weights])
+    for _ in range(4):
+        r = [b * F - mp.matrix(command) for b in B]
+        G = [h * b.T * each for b, each in zip(B, r, strict=True)]
+        n, k = len(free), len(weights)
+        K, residual = mp.zeros(n + k + 1), mp.zeros(n + k + 1, 1)
+        for a, i in enumerate(free):
+            residual[a] = q[i] * F[i] - problem.effort_weight[i] * problem.preferred[i]
+            residual[a] += sum(w[c] * G[c][i] for c in range(k))
+            for b, j in enumerate(free):
+                K[a, b] = sum(w[c] * h * sum(B[c][e, i] * B[c][e, j] for e in range(3)) for c in range(k))
+                K[a, b] += q[i] if i == j else 0
+            for c in range(k):
+                K[a, n + c] = K[n + c, a] = G[c][i]
+        cost = [h * (each.T * each)[0] / 2 for each in r]
+        for c in range(k):
+            residual[n + c] = cost[c] - cost[0]
+            K[n + c, n + k], K[n + k, n + c] = -1, 1
+        residual[n + k] = sum(w) - 1
+        step = mp.lu_solve(K, -residual)
+        for a, i in enumerate(free):
+            F[i] += step[a]
+        for c in range(k):
+            w[c] += step[n + c]
+    return F, tuple(held), tuple(weights)
+
+
+@pytest.mark.slow
+def test_the_allocator_is_differentiated_as_its_optimality_conditions_are():
+    """Truth: differences of the solution of the conditions in 30 digits, at many sets of bounds and worst vertices."""
+    varied, engine, _, record, _ = flown("huang2020/slew", "funnel_robust", ROBUST, samples=1)
+    scheme, count = varied.scheme, record.shape[1]
+    problem = scheme.actuation.allocator.problem
+    reach = scheme.actuation.rate * varied.mission.timing.sample_period
+    box = [np.clip(np.full(problem.count, side), scheme.actuation.lower, scheme.actuation.upper)
+           for side in (-reach, reach)]  # fmt: skip
+    rng, sets, none = np.random.default_rng(5), set(), np.zeros(problem.count)
+    for _ in range(40):
+        p = varied.parameters.nominal.copy()
+        p[:3] = rng.standard_normal(3) * 10 ** rng.uniform(-4, -1)
+        direction = np.append(rng.standard_normal(3), 0.0)
+        limited = engine.values(p, 1).asked[0, -problem.count - 3 : -problem.count]
+        slopes = np.zeros(count)
+        for i in range(count - problem.count - 3, count):
+            weights = np.zeros(record.shape)
+            weights[0, i] = 1.0
+            (slopes[i],) = engine.tangents(p, 1, weights, direction[None, :])
+        efforts, slopes = np.split(slopes, [count - problem.count])
+        raw = OnlineSolver(problem).solve(limited, none, *box)
+        step = mp.mpf(10) ** -9
+        try:
+            (ahead, *known), (behind, *_) = (
+                exact_forces(problem, mp.matrix(limited) + sign * step * mp.matrix(efforts[-3:]), box, raw)
+                for sign in (1, -1)
+            )
+        except ZeroDivisionError:  # more worst vertices than the weights can be told of
+            continue
+        sets.add(tuple(known))
+        truth = np.array([float((a - b) / (2 * step)) for a, b in zip(ahead, behind, strict=True)])
+        np.testing.assert_allclose(slopes, truth, rtol=1e-6, atol=1e-7 * np.abs(truth).max())
+    assert len(sets) >= 5
 
 
 KEYS = ["initial.rate_rad_per_s", "scheme.observer_pinv.law.rate_gain"]

@@ -66,7 +66,16 @@ class LongDoubleFlights:
         self._c.gnc_start(*start)
         carried = [columns[name].ctypes.data for name in ("x", "m", "actuators", "good", "tally")]
         flight = _Flight(
-            *carried, record.ctypes.data, 0, samples, 1, None, None, None, seeds.ctypes.data, columns["derived"].ctypes.data
+            *carried,
+            record.ctypes.data,
+            0,
+            samples,
+            1,
+            None,
+            None,
+            None,
+            seeds.ctypes.data,
+            columns["derived"].ctypes.data,
         )
         self._c.gnc_fly(ctypes.byref(flight))
         return record

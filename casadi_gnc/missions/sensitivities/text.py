@@ -64,7 +64,7 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
     Raises
     ------
     FlightError
-        For an allocation that is not an expression.
+        For an allocation called from Python, and for pulses.
     """
     mission, scheme, tapes = varied.mission, varied.scheme, varied.tapes
     plant, timing, allocator = mission.truth, mission.timing, scheme.actuation.allocator
@@ -73,6 +73,11 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
         raise FlightError(
             f"scheme {scheme.name!r} allocates by {type(allocator).__name__}, which is called from Python and has no "
             'derivatives; take allocation by "pinv", or by "robust" with the on-board solver'
+        )
+    if "modulate" in tapes.functions:
+        raise FlightError(
+            f"scheme {scheme.name!r} makes pulses, which begin and end at once: a derivative says nothing of them; "
+            "take thrusters without pulses, or differences of flights"
         )
     functions = {**tapes.functions, "ask": asked}
     control = ["stage"] if "stage" in functions else ["sense", "before", "allocate"]
