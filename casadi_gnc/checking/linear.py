@@ -93,11 +93,16 @@ class LinearLoop:
     @cached_property
     def delayed(self) -> np.ndarray:
         """The sampled map with one more sample period between measurement and actuators."""
-        a, b, c, d = self._jacobians[2:]
+        a, b, c, d = self._jacobians[2:6]
         # State: (regulated, memory, actuators still on their way); these act on the plant now.
         n, k = a.shape[0], b.shape[1]
         top = np.hstack([a, b])
         return np.vstack([top, np.hstack([c, d])]) if n + k else np.zeros((0, 0))
+
+    @property
+    def pushed_by_actuators(self) -> np.ndarray:
+        """What actuators do beside what was asked, of which the law hears: to regulated states and memory, (n, N)."""
+        return self._jacobians[6]
 
     @cached_property
     def _jacobians(self) -> tuple[np.ndarray, ...]:
@@ -195,11 +200,17 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
         ca.jacobian(waiting, late),
         ca.jacobian(actuators, state),
         ca.jacobian(actuators, late),
+        ca.vertcat(ca.jacobian(x[rows], late), ca.mtimes(ca.jacobian(later, told), ca.SX(_effectiveness(loop, y)))),
     ]
     return (
         ca.Function("closed", [s.t, s.x, s.m], [closed]),
         ca.Function("jacobians", [s.t, s.x, s.m, told, late], slopes),
     )
+
+
+def _effectiveness(loop: Loop, y: Any) -> Any:
+    """Return what the flight software believes that each actuator makes, (R, N)."""
+    return loop.actuation.matrix(loop.plant.measurement.split(y))
 
 
 def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:

@@ -1,5 +1,7 @@
 """Satellites by tables: what is refused, which laws fit, that they fly, and parts of one's own."""
 
+from typing import Any
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.missions import fitting
+from casadi_gnc.vehicles.satellite import pointing_checks
 
 HEAD = """
 format = 1
@@ -252,9 +255,15 @@ def test_a_part_of_ones_own_is_as_good(tmp_path):
 @pytest.mark.slow
 def test_a_day_of_looking_at_the_earth():
     """Filter, feedback and unloading at 10 Hz: pointing held, wheels off zero and far from their limits all day."""
-    flight = casadi_gnc.fly("satellites/earth_pointing_day")
+    mission = casadi_gnc.load("satellites/earth_pointing_day")
+    flight = casadi_gnc.fly(mission)
     assert all(verdict.robustness > 0 for verdict in flight.verdicts.values())
     late = flight["time"] > 3000
+    # What is checked of the filter beforehand is what it says of itself, and what it truly errs by.
+    craft: Any = mission.craft
+    (noise,) = pointing_checks.checks(craft, mission, mission.scheme())
+    assert np.degrees(3 * flight["attitude_deviation"][late].max()) == pytest.approx(noise.value, rel=0.2)
+    assert noise.value < flight["pointing_error_deg"][late].max() < noise.limit
     speeds = np.abs(flight["wheel_speed"][late])
     assert (speeds > 20).all()  # of 60 that they are to have
     assert (speeds < 100).all()

@@ -13,7 +13,7 @@ from casadi_gnc.allocation.pulses import Pulse, PulseModulation
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.mechanics.firing import STANDARD_GRAVITY, FiringThrusters
-from casadi_gnc.vehicles.satellite import part_tables
+from casadi_gnc.vehicles.satellite import part_tables, pointing_checks
 from casadi_gnc.vehicles.satellite.part_tables import ThrusterTable
 
 PULSES = "satellites/thruster_pulses"
@@ -114,7 +114,7 @@ def test_a_thousand_seconds_of_pulses():
     assert np.abs(behind).max() <= 0.5 * LEAST * MOST + 1e-9
     # What truly came out: all pulses ended in their sample, but for the force that still falls from the last.
     delivered = flight["impulse"]
-    falling = 0.004 * flight["thrust"]
+    falling = 0.006 * flight["thrust"]
     due = np.vstack([np.zeros(8), np.cumsum(told, axis=0)[:-1] * step])
     assert np.abs(delivered + falling - due).max() < 1e-9
     assert (widths.max(axis=1) <= step - 0.01).all()
@@ -134,3 +134,20 @@ def test_pulses_have_the_same_words_on_both_engines():
     mission = casadi_gnc.load(PULSES, changes=PINV).with_timing(duration=10.0)
     c, vm = (casadi_gnc.fly(mission, engine=engine, maths="libm").samples for engine in ("c", "vm"))
     assert np.array_equal(c, vm)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("least_on", [LEAST, 0.12])
+def test_the_limit_cycle_that_is_checked_bounds_the_flown_one(least_on):
+    """About its mean the attitude stays within the bound, and comes near: pulses six times as long swing more."""
+    changes = {f"thruster.{i}.pulse.least_on_s": least_on for i in range(1, 9)} | {
+        "slosh.1.mass_kg": 0.1,
+        "slosh.2.mass_kg": 0.1,
+    }
+    mission = casadi_gnc.load(PULSES, changes={**PINV, **changes})
+    craft: Any = mission.craft
+    (check,) = pointing_checks.checks(craft, mission, mission.scheme())
+    assert check.verdict == ("ok" if least_on == LEAST else "warn")
+    late = casadi_gnc.fly(mission, decimation=1)["mrp"][1500:]
+    swing = 4 * np.degrees(np.linalg.norm(late - late.mean(axis=0), axis=1).max())
+    assert 0.05 * check.value < swing <= check.value

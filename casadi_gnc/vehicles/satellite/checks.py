@@ -1,4 +1,4 @@
-"""What can be said of a satellite before it flies: its modes against the sampling, its wheels, its field."""
+"""What can be said of a satellite before it flies: its modes and valves against the sampling, its wheels, its field."""
 
 from __future__ import annotations
 
@@ -10,19 +10,35 @@ from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
-from . import budgets
+from . import budgets, pointing_checks
 
 if TYPE_CHECKING:
     from .craft import SatelliteCraft
 
 #: Steps of the integrator that a period of the fastest motion needs to be followed to about 1e-4 of its amplitude.
 _STEPS = 20
+#: Largest step, in units of the time constant, at which the classic Runge-Kutta method is stable.
+_STABLE = 2.785
 
 
 def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield momentum, slews and coils, and whether modes and liquids are slow enough for sampling and integrator."""
     yield from budgets.checks(craft, mission)
+    yield from pointing_checks.checks(craft, mission, scheme)
     timing = mission.timing
+    step = timing.sample_period / timing.substeps
+    rising = [each.rise_time_s for each in craft.thruster if each.rise_time_s > 0]
+    if rising:
+        yield Check(
+            "numbers.thruster_rise",
+            step / min(rising),
+            _STABLE,
+            "-",
+            "fail",
+            "The integrator's steps are too long for the force of a thruster that rises so fast: it grows without end.",
+            "Raise timing.plant_substeps, or leave rise_time_s out.",
+            "largest step of the classic Runge-Kutta method for x' = -x",
+        )
     swings = [("flexible_mode", i, each.frequency_Hz) for i, each in enumerate(craft.flexible_mode, 1)]
     swings += [("slosh", i, each.frequency_Hz) for i, each in enumerate(craft.slosh, 1)]
     if not swings:
@@ -40,7 +56,6 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[
             "Sample faster, or leave the mode out.",
             "Nyquist's frequency",
         )
-    step = timing.sample_period / timing.substeps
     yield Check(
         "numbers.mode_steps",
         2 * math.pi * fastest * step,

@@ -107,6 +107,11 @@ class ThrusterTable(Part):
         return self
 
     @property
+    def least_bit(self) -> Any:
+        """Impulse of its shortest pulse, or least difference of two, [N s]; 0 where it makes no pulses."""
+        return 0.0 if self.pulse is None else self.max_force_N * max(self.pulse.least_on_s, self.pulse.quantum_s)
+
+    @property
     def fires(self) -> bool:
         """Whether its force is more than what it is told."""
         return self.pulse is not None or self.specific_impulse_s is not None or not exact.is_zero(self.rise_time_s)
