@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
     from casadi_gnc.problem_files.synthesis_file import SynthesisCase
+    from casadi_gnc.problem_files.synthesis_into import Target
 
 #: Seconds that a synthesis may take unless more is asked for.
 TIME_LIMIT = 60.0
@@ -21,9 +23,14 @@ def synthesize(
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Seconds after which the search ends without an answer; 0: none.")
     ] = TIME_LIMIT,
+    into: Annotated[
+        Path | None, typer.Option(help="A mission file whose law gets the gains, by their symbols; comments stay.")
+    ] = None,
+    scheme: Annotated[str | None, typer.Option(help="Of that file; needed where it has several.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
 ) -> None:
     """Find gains by a recipe and certify them; exit code 1 where there are none that can be used."""
+    from casadi_gnc.errors import ProblemError
     from casadi_gnc.problem_files.synthesis_file import answer_of, load_synthesis, out_of_time
     from casadi_gnc.synthesis import backends
     from casadi_gnc.system.processes import within
@@ -31,18 +38,40 @@ def synthesize(
     if backend is not None:
         backends.module(backend)
     case = load_synthesis(problem)
+    target = None
+    if into is not None:
+        from casadi_gnc.problem_files.synthesis_into import target_of
+
+        target = target_of(into, scheme)
+    elif scheme is not None:
+        raise ProblemError("--scheme names one of the file that --into names; give --into too")
     try:
         found = within(time_limit, answer_of, problem, backend, told=lambda: _tell(case, backend, time_limit))
     except TimeoutError:
         found = out_of_time(case, backend, time_limit)
+    written = "" if target is None or not found["certified"] else _written(target, case, found)
     if json:
         import json as encoder
 
         typer.echo(encoder.dumps(found, indent=2))
     else:
         _print(case.title or case.name, found)
+        if written:
+            typer.echo(written)
     if not found["certified"]:
         raise typer.Exit(1)
+
+
+def _written(target: Target, case: SynthesisCase, found: dict[str, Any]) -> str:
+    """Write the gains, note so in what was found, and return what is said of that, with what `check` then finds."""
+    from casadi_gnc.checking import check
+
+    mission, paths = target.write(case, found["gains"])
+    found["written"] = {"file": str(target.document.path), "keys": paths}
+    bad = [each for each in check(mission, target.scheme) if each.verdict in ("warn", "fail")]
+    found["written"]["checks"] = {each.name: each.verdict for each in bad}
+    told = ", ".join(f"{each.name} ({each.verdict})" for each in bad)
+    return f"wrote {', '.join(paths)} into {target.document.path}" + (f"; check finds {told}" if told else "")
 
 
 def _tell(case: SynthesisCase, backend: str | None, seconds: float) -> None:

@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from casadi_gnc.errors import ProblemError
 from casadi_gnc.problem_files.document import read
+from casadi_gnc.problem_files.loading import load
+from casadi_gnc.problem_files.synthesis_file import load_synthesis
+from casadi_gnc.problem_files.synthesis_into import target_of
 
 PROGRAM = [sys.executable, "-m", "casadi_gnc.cli.main", "synthesize"]
 
@@ -51,6 +55,58 @@ def test_repaired_synthesis_is_certified():
     low = found["stable_ratios"][0]
     for r, stable in ((1.001 * low, True), (0.999 * low, False), (1.0, True), (10.0, True)):
         assert (np.linalg.eigvals(loop(r)).real.max() < 0) == stable
+
+
+@pytest.mark.slow
+def test_gains_are_written_into_a_mission_that_then_flies(tmp_path):
+    """What is written is what was certified, to the last digit; the other scheme and every comment stay."""
+    path = tmp_path / "docking.toml"
+    path.write_text(read("shi2020/docking").text)
+    done = run("shi2020/synthesis", "--into", str(path), "--scheme", "iobc", "--json")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    before, after = read("shi2020/docking"), read(path)
+    old, new = ({one["name"]: one["law"] for one in each.data["scheme"]} for each in (before, after))
+    assert new["iobc"]["controller_gain"] == found["gains"]["K"]
+    assert new["iobc"]["observer_gain"] == found["gains"]["L"]
+    assert new["iobc"]["disturbance_gain"] == 200.0  # varpi, which the recipe was given
+    assert new["iobc_printed"] == old["iobc_printed"]
+    assert [line.partition("#")[2] for line in before.text.splitlines()] == [
+        line.partition("#")[2] for line in after.text.splitlines()
+    ]
+    assert found["written"]["checks"] == {}
+    assert vars(load(path).scheme("iobc").law)["controller_gain"].full().tolist() == found["gains"]["K"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (
+            ["--into", "nowhere.toml"],
+            "--into is 'nowhere.toml', which is no file; `casadi-gnc problems",
+        ),
+        (["--scheme", "iobc"], "--scheme names one of the file that --into names; give --into too"),
+        (["--into", "docking.toml"], "docking.toml: has the schemes iobc, iobc_printed; name one by --scheme"),
+        (["--into", "docking.toml", "--scheme", "x"], "docking.toml: has no scheme 'x'; there is iobc, iobc_printed"),
+    ],
+)
+def test_where_gains_cannot_go_is_told_before_they_are_sought(tmp_path, arguments, told):
+    (tmp_path / "docking.toml").write_text(read("shi2020/docking").text)
+    done = subprocess.run(
+        [*PROGRAM, "shi2020/synthesis", *arguments], capture_output=True, text=True, timeout=300, cwd=tmp_path
+    )
+    assert done.returncode == 2
+    assert told in done.stderr
+    assert "looking for gains" not in done.stderr
+
+
+def test_a_law_without_such_a_gain_is_told(tmp_path):
+    path = tmp_path / "slew.toml"
+    path.write_text(read("satellites/slew").text)
+    target = target_of(path, None)
+    with pytest.raises(ProblemError, match=r"flies by AttitudePD, which has no gain K, L; its symbols are"):
+        target.changes(load_synthesis("shi2020/synthesis"), {"K": [[1.0]], "L": [[1.0]]})
 
 
 @pytest.mark.parametrize("backend", ["clarabel", pytest.param("barrier", marks=pytest.mark.slow)])
