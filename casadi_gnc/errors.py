@@ -2,6 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+
+def offer(name: object, known: Iterable[str], more: str = "") -> str:
+    """Return the end of a sentence about a name that leads nowhere: what is nearest to it, and what there is.
+
+    Parameters
+    ----------
+    name : what was given.
+    known : the names that there are, in order.
+    more : what there is besides, with its comma or "and".
+    """
+    import difflib
+
+    names = list(known)
+    near = difflib.get_close_matches(str(name)[:100], names, 1)  # its time grows with the product of the lengths
+    hint = f"did you mean {near[0]!r}? There" if near else "there"
+    return f"{hint} is {', '.join(names) or 'none'}{more}"
+
 
 class GncError(Exception):
     """Report anything a user can put right; the command line prints it and exits with 2."""

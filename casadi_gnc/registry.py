@@ -8,14 +8,13 @@ Nothing can take the name of another. Everything that takes a name also takes th
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Mapping
 from importlib import import_module, metadata
 from pathlib import Path
 from typing import Any
 
 from casadi_gnc import guests
-from casadi_gnc.errors import GncError, RegistryError
+from casadi_gnc.errors import GncError, RegistryError, offer
 
 
 class Registry:
@@ -114,9 +113,7 @@ class Registry:
 
     def unknown(self, name: str) -> str:
         """Return the sentence about a name that leads nowhere."""
-        near = difflib.get_close_matches(name, self.names(), 1)
-        hint = f"did you mean {near[0]!r}? There" if near else "there"
-        return f"no {self.kind} {name!r}; {hint} is {', '.join(self.names())}{self._more}"
+        return f"no {self.kind} {name!r}; {offer(name, self.names(), self._more)}"
 
     def name_of(self, thing: Any) -> str:
         """Return the name under which an object can be found, or that of its class."""

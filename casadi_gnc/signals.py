@@ -15,6 +15,8 @@ from typing import Any, Literal
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.errors import offer
+
 Kind = Literal["", "mrp", "rate", "wheel_speed"]
 
 
@@ -84,7 +86,7 @@ class Layout:
         for signal in self.signals:
             if signal.name == name:
                 return signal
-        raise KeyError(f"no signal {name!r}; there is {', '.join(self.names) or 'none'}")
+        raise KeyError(f"no signal {name!r}; {offer(name, self.names)}")
 
     def of_kind(self, kind: Kind) -> tuple[Signal, ...]:
         """Return the signals of a kind."""
@@ -97,7 +99,7 @@ class Layout:
             if signal.name == name:
                 return slice(start, start + signal.size)
             start += signal.size
-        raise KeyError(f"no signal {name!r}; there is {', '.join(self.names) or 'none'}")
+        raise KeyError(f"no signal {name!r}; {offer(name, self.names)}")
 
     def split(self, column: Any) -> SimpleNamespace:
         """Return the signals of a column as attributes; works on SX, MX, DM and numpy columns.

@@ -12,7 +12,7 @@ from casadi_gnc.allocation import backends
 from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, certify, saturation
 from casadi_gnc.allocation.backends import Capability, Found
 from casadi_gnc.allocation.problem import AllocationProblem
-from casadi_gnc.errors import AllocationError
+from casadi_gnc.errors import AllocationError, offer
 from casadi_gnc.mathematics.arrays import real_array
 
 Accuracy = Literal["low", "mid", "high"]
@@ -39,7 +39,7 @@ class Allocator:
         self, problem: AllocationProblem, backend: Any = "clarabel", *, accuracy: Accuracy = "mid", **options: Any
     ) -> None:
         if accuracy not in ACCURACIES:
-            raise AllocationError(f"accuracy {accuracy!r} is not known; there is {', '.join(ACCURACIES)}")
+            raise AllocationError(f"accuracy {accuracy!r} is not known; {offer(accuracy, ACCURACIES)}")
         self._module = backends.module(backend)
         lacking, backend = backends.missing(backend), backends.name_of(backend)
         if lacking:

@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from casadi_gnc.errors import BenchmarkError
+from casadi_gnc.errors import BenchmarkError, offer
 
 Accuracy = Literal["low", "mid", "high"]
 
@@ -125,7 +125,7 @@ CONTESTS = ("allocation", "synthesis", "step", "flight")
 def contest(name: str) -> Any:
     """Return a contest by name, a module; raise `BenchmarkError` naming those there are."""
     if name not in CONTESTS:
-        raise BenchmarkError(f"no benchmark {name!r}; there is {', '.join(CONTESTS)}")
+        raise BenchmarkError(f"no benchmark {name!r}; {offer(name, CONTESTS)}")
     return import_module(f"{__package__}.{name}")
 
 

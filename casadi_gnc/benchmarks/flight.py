@@ -15,7 +15,7 @@ import numpy as np
 
 from casadi_gnc.benchmarks.contest import Accuracy, Family, Judgement, digest
 from casadi_gnc.benchmarks.machine import version
-from casadi_gnc.errors import BenchmarkError, NoCompilerError
+from casadi_gnc.errors import BenchmarkError, NoCompilerError, offer
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.engines import Carried, CompiledEngine, Engine
 from casadi_gnc.missions.flying import begin
@@ -62,7 +62,7 @@ def contestants(wanted: list[str] | None) -> list[str]:
         return [name for name in _ENGINES if not name.startswith("c") or compilers.available()]
     unknown = [name for name in wanted if name not in _ENGINES]
     if unknown or not wanted:
-        raise BenchmarkError(f"no engine {', '.join(unknown) or 'is named'}; there is {', '.join(_ENGINES)}")
+        raise BenchmarkError(f"no engine {', '.join(unknown) or 'is named'}; {offer(', '.join(unknown), _ENGINES)}")
     return list(dict.fromkeys(wanted))
 
 

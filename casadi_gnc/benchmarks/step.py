@@ -15,7 +15,7 @@ import numpy as np
 from casadi_gnc.benchmarks.contest import Accuracy, Family, Judgement, digest
 from casadi_gnc.benchmarks.engines_of_a_step import Way, buffer_way, c_way, call_way, casadi_c_way, python_way
 from casadi_gnc.benchmarks.machine import version
-from casadi_gnc.errors import BenchmarkError, FlightError
+from casadi_gnc.errors import BenchmarkError, FlightError, offer
 from casadi_gnc.problem_files.loading import load
 from casadi_gnc.system import compilers
 
@@ -80,7 +80,9 @@ def contestants(wanted: list[str] | None) -> list[str]:
         return [name for name in _WAYS if name in _NEED_NO_COMPILER or compilers.available()]
     unknown = [name for name in wanted if name not in _WAYS]
     if unknown or not wanted:
-        raise BenchmarkError(f"no way {', '.join(unknown) or 'is named'} to run a step; there is {', '.join(_WAYS)}")
+        raise BenchmarkError(
+            f"no way {', '.join(unknown) or 'is named'} to run a step; {offer(', '.join(unknown), _WAYS)}"
+        )
     return list(dict.fromkeys(wanted))
 
 

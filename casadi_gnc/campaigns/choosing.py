@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from casadi_gnc.campaigns.engines import CompiledBatch, best_vectors
 from casadi_gnc.campaigns.program import BatchEngine, Program
-from casadi_gnc.errors import CampaignError, GpuError
+from casadi_gnc.errors import CampaignError, GpuError, offer
 
 #: Engines by name.
 ENGINES = ("auto", "c", "cuda", "dask", "dask:cuda")
@@ -42,7 +42,7 @@ class Choice:
 def refuse_unknown(engine: str, scheduler: str | None) -> None:
     """Raise `CampaignError` for an engine that there is not, or a scheduler that it does not use."""
     if engine not in ENGINES:
-        raise CampaignError(f"no engine {engine!r}; there is {', '.join(ENGINES)}")
+        raise CampaignError(f"no engine {engine!r}; {offer(engine, ENGINES)}")
     if scheduler is not None and engine in ("c", "cuda"):
         raise CampaignError(f"engine {engine!r} uses no scheduler, and {scheduler!r} is given; take --engine dask")
 

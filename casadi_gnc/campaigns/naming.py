@@ -27,7 +27,7 @@ from casadi_gnc.campaigns.orientations import Direction, Rotation
 from casadi_gnc.campaigns.pick_freeze import PickFreeze
 from casadi_gnc.campaigns.plan import Plan
 from casadi_gnc.campaigns.plans import Independent, LatinHypercube, Sobol
-from casadi_gnc.errors import CampaignError
+from casadi_gnc.errors import CampaignError, offer
 
 #: Names of plans, for messages.
 PLANS = (
@@ -93,7 +93,7 @@ class Parts:
                 raise CampaignError(f"the direction has {part.strip()!r}; expected KEY or KEY=NUMBER")
             places = self._places(key)
             if not places:
-                raise CampaignError(f"{key!r} does not vary; there is {', '.join(self.keys) or 'nothing that does'}")
+                raise CampaignError(f"{key!r} does not vary; {offer(key, self.keys)}")
             for place in places:
                 found[place] = size
         return tuple(found)
@@ -131,7 +131,7 @@ def plan_of(name: str, parts: Parts, flights: int) -> Plan:
         "pick_freeze": lambda: _pick_freeze(parts, flights),
     }
     if name not in made:
-        raise CampaignError(f"no plan {name!r}; there is {', '.join(PLANS)}")
+        raise CampaignError(f"no plan {name!r}; {offer(name, PLANS)}")
     return made[name]()
 
 

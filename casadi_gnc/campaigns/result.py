@@ -15,7 +15,7 @@ import numpy as np
 from casadi_gnc.campaigns.cases import Cases
 from casadi_gnc.campaigns.store import MISSING, SHORT, WHOLE, Columns, Store, read_identity, shards
 from casadi_gnc.campaigns.summary import badness, summarised
-from casadi_gnc.errors import CampaignError
+from casadi_gnc.errors import CampaignError, offer
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.one_build import OneBuild, fly_case
 from casadi_gnc.missions.scheme import Metric
@@ -151,8 +151,8 @@ class Campaign:
         for metric in self.metrics:
             if metric.name == name:
                 return metric
-        known = ", ".join(metric.name for metric in self.metrics) or "none"
-        raise CampaignError(f"the mission has no metric {name!r}; there is {known}")
+        known = [metric.name for metric in self.metrics]
+        raise CampaignError(f"the mission has no metric {name!r}; {offer(name, known)}")
 
     def worst(self, metric: str) -> Case:
         """Return the worst case of a metric."""
@@ -203,9 +203,7 @@ class Campaign:
     def _farthest(self, requirement: str) -> int:
         known = [one.id for one in self.cases.varied.nominal.requirements]
         if requirement not in known:
-            raise CampaignError(
-                f"the mission has no requirement {requirement!r}; there is {', '.join(known) or 'none'}"
-            )
+            raise CampaignError(f"the mission has no requirement {requirement!r}; {offer(requirement, known)}")
         flew = self.flew
         margins = self.column(f"requirement.{requirement}")[flew]
         if not (margins < 0).any():

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.progress import is_silenced
+
 if TYPE_CHECKING:
     from casadi_gnc.problem_files.allocating import CaseAllocator, Tally
 
@@ -23,7 +26,10 @@ class AccuracyChoice(str, Enum):
 
 
 def allocate(
-    problem: Annotated[str, typer.Argument(help="An allocation file, or the name of a shipped one.")],
+    problem: Annotated[
+        str,
+        typer.Argument(autocompletion=completing.problems, help="An allocation file, or the name of a shipped one."),
+    ],
     commands: Annotated[Path | None, typer.Option(help="CSV with columns u1, u2, ...: one command a row.")] = None,
     backend: Annotated[str, typer.Option(help="online, clarabel, sdp, ipopt, scs, pinv, ...")] = "online",
     out: Annotated[Path | None, typer.Option(help="CSV of the answers; standard output if left out.")] = None,
@@ -117,6 +123,8 @@ def _print_summary(tally: Tally, *, as_json: bool, to_stderr: bool) -> None:
     found: dict[str, Any] = tally.summary()
     if as_json:
         typer.echo(encoder.dumps(found), err=to_stderr)
+        return
+    if is_silenced():
         return
     statuses = ", ".join(f"{count} {name}" for name, count in found["statuses"].items()) or "no answers"
     latency = ", ".join(f"{name.removesuffix('_us')} {value:g}" for name, value in found["latency"].items())

@@ -7,9 +7,16 @@ from typing import Annotated
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import tell
+from casadi_gnc.cli.progress import working
+
 
 def attainable(
-    problem: Annotated[str, typer.Argument(help="An allocation file, or the name of a shipped one.")],
+    problem: Annotated[
+        str,
+        typer.Argument(autocompletion=completing.problems, help="An allocation file, or the name of a shipped one."),
+    ],
     plot: Annotated[Path | None, typer.Option(help="Draw the sets' slices into this PNG.")] = None,
     samples: Annotated[int, typer.Option(min=0, help="Errors tried besides the corners.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
@@ -27,7 +34,8 @@ def attainable(
     case = load_allocation(problem)
     if plot is not None:
         prepare_folder(plot.parent)
-    found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed, units=case.units)
+    with working("measuring attainable sets"):
+        found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed, units=case.units)
     if json:
         import json as encoder
 
@@ -42,4 +50,4 @@ def attainable(
         from casadi_gnc.allocation.attainable_plots import plot_slices
 
         plot_slices(case.physical, plot, wanted=case.torque_limit)
-        typer.echo(f"wrote {plot}", err=json)
+        tell(f"wrote {plot}", aside=json)

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casadi_gnc.cli import completing
 from casadi_gnc.cli.campaign_summary import print_summary
+from casadi_gnc.cli.manners import tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -25,13 +27,20 @@ class Ending(str, Enum):
 
 
 def campaign(
-    problem: Annotated[str, typer.Argument(help='A problem file, a shipped one\'s name; or "show" and a folder.')],
+    problem: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=completing.problems, help='A problem file, a shipped one\'s name; or "show" and a folder.'
+        ),
+    ],
     folder: Annotated[Path | None, typer.Argument(help='After "show": folder of a campaign.')] = None,
     flights: Annotated[
         int | None, typer.Option(min=1, help="Number of cases; 1000 if left out. More than a folder has: goes on.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder of the rows; out/<mission>-campaign if left out.")] = None,
-    scheme: Annotated[str | None, typer.Option(help="Which scheme flies; the first if left out.")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(autocompletion=completing.schemes, help="Which scheme flies; the first if left out.")
+    ] = None,
     plan: Annotated[
         str,
         typer.Option(
@@ -84,7 +93,7 @@ def campaign(
 
     def said(sentence: str) -> None:
         if not json:
-            typer.echo(sentence, err=True)
+            tell(sentence)
 
     with Progress("cases", quiet=json) as told:
         made = by_name.campaign(
@@ -110,7 +119,7 @@ def campaign(
     _tell(made, confidence, json, pictures, picture_format, report)
     if keep is not None and (made.folder / FOLDER).exists():
         count = len(list((made.folder / FOLDER).glob("*.npz")))
-        typer.echo(f"kept {count} whole records in {made.folder / FOLDER}", err=json)
+        tell(f"kept {count} whole records in {made.folder / FOLDER}", aside=json)
 
 
 def _tell(
@@ -125,8 +134,8 @@ def _tell(
         from casadi_gnc.reports.campaign_gallery import draw_campaign
 
         drawn = draw_campaign(made, pictures, confidence=confidence, ending=ending.value)
-        typer.echo(f"drew {len(drawn)} pictures into {pictures}", err=json)
+        tell(f"drew {len(drawn)} pictures into {pictures}", aside=json)
     if report is not None:
         from casadi_gnc.reports.campaign_page import of_campaign
 
-        typer.echo(f"wrote {of_campaign(made, report, confidence)}", err=json)
+        tell(f"wrote {of_campaign(made, report, confidence)}", aside=json)

@@ -6,7 +6,11 @@ from typing import Annotated, Any
 
 import typer
 
-_PROBLEM = typer.Argument(help="A mission file: what it names of your own is listed too.")
+from casadi_gnc.cli import completing
+
+_PROBLEM = typer.Argument(
+    autocompletion=completing.problems, help="A mission file: what it names of your own is listed too."
+)
 _NAME = typer.Option("--show", help="Show this one only, in full.")
 _JSON = typer.Option("--json", help="Print as JSON, nothing else.")
 
@@ -71,12 +75,12 @@ def crafts(
 
 
 def _chosen(found: list[dict[str, Any]], name: str | None, kind: str) -> list[dict[str, Any]]:
-    from casadi_gnc.errors import RegistryError
+    from casadi_gnc.errors import RegistryError, offer
 
     if name is None:
         return found
     if name not in [one["name"] for one in found]:
-        raise RegistryError(f"no {kind} {name!r}; there is {', '.join(one['name'] for one in found)}")
+        raise RegistryError(f"no {kind} {name!r}; {offer(name, [one['name'] for one in found])}")
     return [one for one in found if one["name"] == name]
 
 

@@ -8,14 +8,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.progress import working
+
 if TYPE_CHECKING:
     from casadi_gnc.checks import Check
     from casadi_gnc.problem_files.checking import Checked
 
 
 def check(
-    problem: Annotated[str, typer.Argument(help="A mission or synthesis file, or the name of a shipped one.")],
-    scheme: Annotated[list[str] | None, typer.Option(help="Only this scheme; may be repeated.")] = None,
+    problem: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=completing.problems, help="A mission or synthesis file, or the name of a shipped one."
+        ),
+    ],
+    scheme: Annotated[
+        list[str] | None, typer.Option(autocompletion=completing.schemes, help="Only this scheme; may be repeated.")
+    ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the margins into this file (.png or .svg).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
@@ -55,7 +65,8 @@ def _checked(problem: str, schemes: list[str] | None) -> Checked:
 
     document = read(problem)
     if document.data.get("kind") != "synthesis":
-        return checked_file(problem, schemes)
+        with working(f"checking {document.path.name}"):
+            return checked_file(problem, schemes)
     from casadi_gnc.system.processes import within
 
     try:

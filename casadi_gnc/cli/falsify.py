@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -24,9 +26,16 @@ class Within(str, Enum):
 
 
 def falsify(
-    problem: Annotated[str, typer.Argument(help="A mission file with [[dispersion]]s, or a shipped one's name.")],
+    problem: Annotated[
+        str,
+        typer.Argument(
+            autocompletion=completing.problems, help="A mission file with [[dispersion]]s, or a shipped one's name."
+        ),
+    ],
     requirement: Annotated[str, typer.Option(help="The id of the requirement that is to break.")],
-    scheme: Annotated[str | None, typer.Option(help="Which scheme flies; the first if left out.")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(autocompletion=completing.schemes, help="Which scheme flies; the first if left out.")
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Problem file of the break; out/<mission>-<requirement>.toml if left out."),
@@ -75,7 +84,7 @@ def falsify(
     else:
         _print(found)
     if found.known:
-        typer.echo(f"{found.known} of the flights were known from {file}.journal", err=True)
+        tell(f"{found.known} of the flights were known from {file}.journal")
     if found.broken is not None:
         raise typer.Exit(1)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -32,9 +33,13 @@ class ModeChoice(str, Enum):
 
 
 def fly(
-    problem: Annotated[str, typer.Argument(help="A problem file, or the name of a shipped one.")],
+    problem: Annotated[
+        str, typer.Argument(autocompletion=completing.problems, help="A problem file, or the name of a shipped one.")
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder for the results; out/<mission> if left out.")] = None,
-    scheme: Annotated[list[str] | None, typer.Option(help="Fly only this scheme; may be repeated.")] = None,
+    scheme: Annotated[
+        list[str] | None, typer.Option(autocompletion=completing.schemes, help="Fly only this scheme; may be repeated.")
+    ] = None,
     engine: Annotated[
         str, typer.Option(help="c: compiled C; vm: CasADi's virtual machine; or ./file.py:CLASS, or a package's.")
     ] = "c",

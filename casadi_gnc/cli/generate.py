@@ -8,6 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import print_json
+from casadi_gnc.cli.progress import working
+
 
 class RealChoice(str, Enum):
     """Type of every number."""
@@ -33,16 +37,25 @@ class FormatChoice(str, Enum):
 
 def generate(
     problem: Annotated[
-        str, typer.Argument(help="A mission or allocation file, or the name of a shipped one; a .casadi file.")
+        str,
+        typer.Argument(
+            autocompletion=completing.problems,
+            help="A mission or allocation file, or the name of a shipped one; a .casadi file.",
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(help="Folder of the package, or the .fmu; flight/<name> if left out.")
     ] = None,
-    scheme: Annotated[str | None, typer.Option(help="Which scheme of the mission; the first one if left out.")] = None,
+    scheme: Annotated[
+        str | None,
+        typer.Option(autocompletion=completing.schemes, help="Which scheme of the mission; the first one if left out."),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="Prefix of every C symbol; the file's name if left out.")] = None,
     real: Annotated[RealChoice, typer.Option(help="Type of every number.")] = RealChoice.float64,
     tunable: Annotated[str, typer.Option(help="Gains that stay variables of the C, apart by commas.")] = "",
-    target: Annotated[str, typer.Option(help="Targets to measure for the README, apart by commas.")] = "",
+    target: Annotated[
+        str, typer.Option(autocompletion=completing.targets, help="Targets to measure for the README, apart by commas.")
+    ] = "",
     format: Annotated[
         FormatChoice, typer.Option(help="C package, alone or with a frame for it; an FMI unit (fmu is fmi2).")
     ] = FormatChoice.package,
@@ -63,6 +76,7 @@ def generate(
         Path | None, typer.Option(help="Of a function: CSV of the inputs of the shipped steps, columns x[0], x[1], ...")
     ] = None,
     force: Annotated[bool, typer.Option(help="Overwrite a package whose files were edited.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Write the controller as C that an embedded project takes as it is, with a flight to test it by."""
     from casadi_gnc.delivery import generating
@@ -77,26 +91,33 @@ def generate(
             raise PackageError("a unit is made of a mission; leave out what is for others")
         fmi = 3 if format is FormatChoice.fmi3 else 2
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains, fmi=fmi)
-        typer.echo(terminal(f"wrote {written}"))
+        if json:
+            print_json({"wrote": [str(written)], "manifest": None, "warnings": []})
+        else:
+            typer.echo(terminal(f"wrote {written}"))
         return
     folder = Path("flight") / (name or Path(problem).stem) if out is None else out
-    about = generating.generate(
-        problem,
-        folder,
-        scheme=scheme,
-        name=name,
-        real=real.value,
-        tunable=gains,
-        target=boards,
-        steps=steps,
-        force=force,
-        state=_pairs(state) if state else None,
-        ports=_ports(ports) if ports else None,
-        rate=rate,
-        vectors=vectors,
-        commands=commands,
-        frame="" if format is FormatChoice.package else format.value,
-    )
+    with working(f"writing {folder}"):
+        about = generating.generate(
+            problem,
+            folder,
+            scheme=scheme,
+            name=name,
+            real=real.value,
+            tunable=gains,
+            target=boards,
+            steps=steps,
+            force=force,
+            state=_pairs(state) if state else None,
+            ports=_ports(ports) if ports else None,
+            rate=rate,
+            vectors=vectors,
+            commands=commands,
+            frame="" if format is FormatChoice.package else format.value,
+        )
+    if json:
+        print_json({"wrote": [str(folder)], "manifest": about, "warnings": about.pop("warnings")})
+        return
     scheme_of = f", scheme {about['scheme']}" if about["scheme"] else ""
     typer.echo(terminal(f"{about['title']}{scheme_of}, {about['real']}: wrote {folder}"))
     for warning in about["warnings"]:

@@ -5,84 +5,14 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Callable
-from functools import wraps
-from typing import Any
 
-import typer
-
-from casadi_gnc.cli import (
-    allocate,
-    attainable,
-    bench,
-    campaign,
-    catalogue,
-    check,
-    demo,
-    doctor,
-    falsify,
-    fly,
-    generate,
-    margins,
-    new,
-    problems,
-    report,
-    reproduce,
-    schema,
-    synthesize,
-    tune,
-    verify,
-)
+from casadi_gnc.cli.commands import app
 from casadi_gnc.errors import GncError
 
 # Matrices here are small: threads of the linear algebra wait for each other longer than they work, a hundredfold on a
 # machine that has other work, and add in another order with their number. Read when NumPy is first imported.
 for _variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
-
-
-def _about_its_file(command: Callable[..., None]) -> Callable[..., None]:
-    """Return a command that names its problem file in whatever is wrong."""
-
-    @wraps(command)
-    def named(*arguments: Any, **options: Any) -> None:
-        from casadi_gnc.problem_files.boundary import about
-
-        with about(options["problem"]):
-            command(*arguments, **options)
-
-    return named
-
-
-app = typer.Typer(
-    name="casadi-gnc",
-    help="Spacecraft guidance, navigation and control: from a problem file to flight C, with proof.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-)
-app.command("demo")(demo.demo)
-app.command("fly")(_about_its_file(fly.fly))
-app.command("campaign")(campaign.campaign)
-app.command("falsify")(_about_its_file(falsify.falsify))
-app.command("check")(check.check)
-app.command("margins")(_about_its_file(margins.margins))
-app.command("tune")(_about_its_file(tune.tune))
-app.command("allocate")(_about_its_file(allocate.allocate))
-app.command("attainable")(_about_its_file(attainable.attainable))
-app.command("synthesize")(synthesize.synthesize)
-app.command("generate")(_about_its_file(generate.generate))
-app.command("verify")(verify.verify)
-app.command("report")(report.report)
-app.add_typer(bench.app, name="bench")
-app.add_typer(problems.app, name="problems")
-app.command("reproduce")(reproduce.reproduce)
-app.command("new")(new.new)
-app.command("laws")(catalogue.laws)
-app.command("crafts")(catalogue.crafts)
-app.command("schema")(schema.schema)
-app.command("doctor")(doctor.doctor)
 
 
 def main() -> None:

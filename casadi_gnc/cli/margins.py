@@ -8,13 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.progress import Progress
+
 if TYPE_CHECKING:
     from casadi_gnc.checking.broken_loops import SchemeMargins
 
 
 def margins(
-    problem: Annotated[str, typer.Argument(help="A mission file, or the name of a shipped one.")],
-    scheme: Annotated[list[str] | None, typer.Option(help="Only this scheme; may be repeated.")] = None,
+    problem: Annotated[
+        str, typer.Argument(autocompletion=completing.problems, help="A mission file, or the name of a shipped one.")
+    ],
+    scheme: Annotated[
+        list[str] | None, typer.Option(autocompletion=completing.schemes, help="Only this scheme; may be repeated.")
+    ] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw Nichols and Bode pictures into this file (.png, .svg).")
     ] = None,
@@ -27,11 +34,14 @@ def margins(
 
     mission = load(problem)
     found, lacking = [], []
-    for one in [mission.scheme(name) for name in scheme] if scheme else mission.schemes:
-        try:
-            found.append(scheme_margins(mission, one))
-        except FlightError as error:
-            lacking.append(str(error))
+    asked = [mission.scheme(name) for name in scheme] if scheme else mission.schemes
+    with Progress("margins") as told:
+        for done, one in enumerate(asked, 1):
+            try:
+                found.append(scheme_margins(mission, one))
+            except FlightError as error:
+                lacking.append(str(error))
+            told(done, len(asked))
     if not found:
         raise FlightError("; ".join(lacking))
     if plot is not None:

@@ -10,6 +10,8 @@ from typing import Annotated
 
 import typer
 
+from casadi_gnc.cli.manners import tell_written
+
 
 class Kind(str, Enum):
     """What is begun."""
@@ -22,6 +24,7 @@ def new(
     kind: Annotated[Kind, typer.Argument(help="craft or law.")],
     name: Annotated[str, typer.Argument(help="Name of the class, e.g. SailCraft; files are called sail_craft.")],
     folder: Annotated[Path, typer.Option(help="Where to put the files.")] = Path(),
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Write NAME as a Python file with a mission that flies it; existing files are never overwritten."""
     from importlib import resources
@@ -46,5 +49,6 @@ def new(
         text = text.replace(whole, name).replace("Starter", base).replace("starter", stem)
         write_beside(target, lambda path, text=text: path.write_text(text, encoding="utf-8"))
         written.append(target)
-    typer.echo(f"wrote {', '.join(map(str, written))}")
-    typer.echo(f"next: casadi-gnc check {targets['toml']}; casadi-gnc fly {targets['toml']} --out out")
+    tell_written(written, json=json)
+    if not json:
+        typer.echo(f"next: casadi-gnc check {targets['toml']}; casadi-gnc fly {targets['toml']} --out out")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casadi_gnc.cli.progress import Progress
+
 if TYPE_CHECKING:
     from casadi_gnc.fidelity import PaperReport
 
@@ -29,7 +31,7 @@ def reproduce(
         prepare_folder(out)
     reports = []
     for name, file in files.items():
-        with _Progress(name, quiet=json) as progress:
+        with Progress(name, quiet=json) as progress:
             answers = fidelity.answer(file, processes=processes, progress=progress, fresh=fresh)
         reports.append(fidelity.PaperReport(Path(name).stem if name.endswith(".toml") else name, file, answers))
     written = _write(out, reports) if out is not None else []
@@ -53,25 +55,6 @@ def _write(folder: Path, reports: list[PaperReport]) -> list[Path]:
 
     drawn = {each.name: figures.draw(each, folder) for each in reports}
     return report.write(folder, reports, drawn)
-
-
-class _Progress:
-    """Show a bar of the questions answered, on a terminal only."""
-
-    def __init__(self, name: str, *, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        console = Console(stderr=True)
-        self._bar = Progress(console=console, transient=True, disable=quiet or not console.is_terminal)
-        self._task = self._bar.add_task(name, total=None)
-
-    def __enter__(self):
-        self._bar.start()
-        return lambda done, total: self._bar.update(self._task, completed=done, total=total)
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
 
 
 def _print(report: PaperReport) -> None:

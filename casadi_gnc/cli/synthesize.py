@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import tell
+
 if TYPE_CHECKING:
     from casadi_gnc.problem_files.synthesis_file import SynthesisCase
     from casadi_gnc.problem_files.synthesis_into import Target
@@ -16,7 +19,9 @@ TIME_LIMIT = 60.0
 
 
 def synthesize(
-    problem: Annotated[str, typer.Argument(help="A synthesis file, or the name of a shipped one.")],
+    problem: Annotated[
+        str, typer.Argument(autocompletion=completing.problems, help="A synthesis file, or the name of a shipped one.")
+    ],
     backend: Annotated[
         str | None, typer.Option(help="clarabel, scs, barrier or ./file.py:NAME, instead of the file's.")
     ] = None,
@@ -81,7 +86,7 @@ def _tell(case: SynthesisCase, backend: str | None, seconds: float) -> None:
     given = getattr(case.recipe, "gamma", None) is not None
     verb = "solving with the bound that is given" if given else "looking for gains"
     until = f"; ends after {seconds:g} s (--time-limit)" if seconds else ""
-    typer.echo(f"{case.name}: {verb}{size} by {backend or case.backend}{until}", err=True)
+    tell(f"{case.name}: {verb}{size} by {backend or case.backend}{until}")
 
 
 def _print(title: str, found: dict[str, Any]) -> None:

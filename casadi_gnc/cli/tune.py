@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import tell
+
 if TYPE_CHECKING:
     from casadi_gnc.tuning.outcome import Moved, Tuned
 
@@ -29,10 +32,14 @@ class ConditionsChoice(str, Enum):
 
 
 def tune(
-    problem: Annotated[str, typer.Argument(help="A mission file, or the name of a shipped one.")],
+    problem: Annotated[
+        str, typer.Argument(autocompletion=completing.problems, help="A mission file, or the name of a shipped one.")
+    ],
     free: Annotated[str, typer.Option(help="Gains that may change, with commas: rate_gain,attitude_gain=0.1:5.")],
     out: Annotated[Path, typer.Option(help="The problem file with the new gains; comments stay.")],
-    scheme: Annotated[str | None, typer.Option(help="The scheme; the first if left out.")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(autocompletion=completing.schemes, help="The scheme; the first if left out.")
+    ] = None,
     against: Annotated[
         AgainstChoice, typer.Option(help="The mission as it is, its worst case, or the mean of a campaign.")
     ] = AgainstChoice.nominal,
@@ -72,7 +79,7 @@ def tune(
         seed=seed,
         out=out,
         threads=threads,
-        told=lambda sentence: typer.echo(sentence, err=True),
+        told=tell,
     )
     if report is not None:
         from casadi_gnc.problem_files.loading import load

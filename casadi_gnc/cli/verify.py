@@ -7,11 +7,17 @@ from typing import Annotated, Any
 
 import typer
 
+from casadi_gnc.cli import completing
+from casadi_gnc.cli.progress import working
+
 
 def verify(
     package: Annotated[Path, typer.Argument(help="Folder that `casadi-gnc generate` wrote.")],
     target: Annotated[
-        str, typer.Option(help="host and names of targets, apart by commas; all: every target.")
+        str,
+        typer.Option(
+            autocompletion=completing.targets, help="host and names of targets, apart by commas; all: every target."
+        ),
     ] = "host",
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
@@ -29,7 +35,8 @@ def verify(
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
     if "all" in wanted:
         wanted = ["host", *boards.names()]
-    found = run(package, wanted)
+    with working(f"comparing words on {', '.join(wanted)}"):
+        found = run(package, wanted)
     if report is not None:
         from casadi_gnc.reports.package_page import of_verification
 

@@ -5,14 +5,13 @@ A board of your own is a file like those: `--target ./board.toml`.
 
 from __future__ import annotations
 
-import difflib
 import shutil
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from casadi_gnc.errors import TargetError
+from casadi_gnc.errors import TargetError, offer
 from casadi_gnc.registry import Registry
 from casadi_gnc.system import assets
 
@@ -88,10 +87,9 @@ def find(name: Any) -> Target:
     if _shipped(str(name)).is_file():
         return of_file(_shipped(str(name)))
     if name not in REGISTRY.names():
-        near = difflib.get_close_matches(str(name), names(), 1)
-        hint = f"did you mean {near[0]!r}? There" if near else "there"
-        known = ", ".join(names())
-        raise TargetError(f"no target {name!r}; {hint} is host, {known}, and the path of a file of your own")
+        raise TargetError(
+            f"no target {name!r}; {offer(name, ['host', *names()], ', and the path of a file of your own')}"
+        )
     return find(REGISTRY.find(name))
 
 

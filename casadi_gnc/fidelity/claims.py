@@ -22,7 +22,7 @@ from pydantic import (
     model_validator,
 )
 
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import ProblemError, offer
 from casadi_gnc.fidelity.computations import COMPUTATIONS
 from casadi_gnc.problem_files.document import read_kind
 from casadi_gnc.problem_files.mission_tables import Format, MetricAsked
@@ -169,5 +169,5 @@ def read_claims(paper: str) -> ClaimsFile:
     """
     known = papers()
     if paper not in known and not Path(paper).is_file():
-        raise ProblemError(f"no paper {paper!r}; there is {', '.join(known)}, or the path of a claims file")
+        raise ProblemError(f"no paper {paper!r}; {offer(paper, known, ', or the path of a claims file')}")
     return read_kind(known.get(paper, Path(paper)), "claims").validated(ClaimsFile)

@@ -6,12 +6,11 @@ of the craft is of the kind that the law models, and the effort it commands is w
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from casadi_gnc.errors import FlightError, RequirementError
+from casadi_gnc.errors import FlightError, RequirementError, offer
 from casadi_gnc.laws import Law
 from casadi_gnc.missions import asking
 from casadi_gnc.missions.craft import Craft
@@ -96,7 +95,7 @@ def goals(mission: Mission) -> Mapping[str, Sequence[float]]:
     found: Mapping[str, Sequence[float]] = asking.ask(mission.craft, "regulated", mission)
     for name, goal in found.items():
         if name not in state:
-            raise FlightError(f"{craft}.regulated names {name!r}, which is no state; there is {', '.join(state.names)}")
+            raise FlightError(f"{craft}.regulated names {name!r}, which is no state; {offer(name, state.names)}")
         if len(goal) != state.signal(name).size:
             raise FlightError(f"{craft}.regulated gives {len(goal)} numbers of {name}, not {state.signal(name).size}")
     return found
@@ -113,9 +112,7 @@ def refuse(mission: Mission) -> None:
     plant, craft = mission.truth, type(mission.craft).__name__
     unknown = [name for name in mission.start_from if name not in plant.state]
     if unknown:
-        raise FlightError(
-            f"start_from names {unknown[0]!r}, which is no state; there is {', '.join(plant.state.names)}"
-        )
+        raise FlightError(f"start_from names {unknown[0]!r}, which is no state; {offer(unknown[0], plant.state.names)}")
     if len(mission.start) != plant.state.size:
         raise FlightError(f"start_from gives {len(mission.start)} numbers in all, expected {plant.state.size}")
     for scheme in mission.schemes:
@@ -132,8 +129,8 @@ def refuse(mission: Mission) -> None:
             )
     for funnel in mission.funnels:
         if funnel.signal not in plant.measurement:
-            known = ", ".join(plant.measurement.names)
-            raise FlightError(f"there is a funnel of {funnel.signal!r}, which is not measured; there is {known}")
+            told = offer(funnel.signal, plant.measurement.names)
+            raise FlightError(f"there is a funnel of {funnel.signal!r}, which is not measured; {told}")
         for scheme in mission.schemes:
             if scheme.navigation is not None and funnel.signal in scheme.navigation.changed:
                 raise FlightError(
@@ -159,9 +156,8 @@ def refuse_requirement(mission: Mission, asked: Requirement) -> None:
     if asked.metric:
         known = [metric.name for metric in mission.metrics]
         if asked.metric not in known:
-            near = difflib.get_close_matches(asked.metric, known, 1)
-            hint = f"did you mean {near[0]}?" if near else f"there is {', '.join(known) or 'none'}"
-            raise RequirementError(f"{asked.id} bounds {asked.metric!r}, which is no metric; {hint}", "metric")
+            told = offer(asked.metric, known)
+            raise RequirementError(f"{asked.id} bounds {asked.metric!r}, which is no metric; {told}", "metric")
         return
     for scheme in mission.schemes:
         row = row_of(Loop(mission, scheme))
@@ -179,7 +175,7 @@ def complete(mission: Mission, metric: Metric) -> Metric:
         if metric.signal not in row:
             raise FlightError(
                 f"{metric.signal!r} of the metric {metric.name!r} is no signal of scheme {scheme.name}; "
-                f"there is {', '.join(row.names)}"
+                f"{offer(metric.signal, row.names)}"
             )
         unit = row.signal(metric.signal).unit
     return replace(metric, unit="s" if metric.kind in ("settling", "reaching") else unit)

@@ -15,7 +15,7 @@ import casadi as ca
 
 from casadi_gnc import guests
 from casadi_gnc.checks import Check
-from casadi_gnc.errors import FlightError
+from casadi_gnc.errors import FlightError, offer
 from casadi_gnc.guests import GuestFile
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions import fitting, functions, probing
@@ -144,8 +144,8 @@ class Mission:
         for scheme in self.schemes:
             if scheme.name == name:
                 return scheme
-        known = ", ".join(scheme.name for scheme in self.schemes)
-        raise FlightError(f"no scheme {name!r} in {self.name}; there is {known}")
+        known = [scheme.name for scheme in self.schemes]
+        raise FlightError(f"no scheme {name!r} in {self.name}; {offer(name, known)}")
 
     def with_timing(self, **changes: Any) -> Mission:
         """Return the mission with another `mode`, `sample_period`, `duration` or `substeps`.

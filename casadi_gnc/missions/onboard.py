@@ -17,7 +17,7 @@ import numpy as np
 
 from casadi_gnc.allocation import OnlineInFlight
 from casadi_gnc.embedded.controller import Controller, Tunable
-from casadi_gnc.errors import PackageError
+from casadi_gnc.errors import PackageError, offer
 from casadi_gnc.laws import gains_of
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.loop import Loop
@@ -91,7 +91,7 @@ def _parameter(scheme: Scheme, name: str) -> Tunable:
     """Return the description of a gain, with the file's value as default."""
     declared = {key: field for key, field in gains_of(type(scheme.law)).items() if "choices" not in field.metadata}
     if name not in declared:
-        raise PackageError(f"{name!r} is no gain of scheme {scheme.name!r}; there is {', '.join(declared) or 'none'}")
+        raise PackageError(f"{name!r} is no gain of scheme {scheme.name!r}; {offer(name, declared)}")
     value, about = getattr(scheme.law, name), declared[name].metadata
     if value is None:
         raise PackageError(f"{name!r} is not given in scheme {scheme.name!r}; give it a value to make it tunable")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.embedded.printer import Math
-from casadi_gnc.errors import FlightError
+from casadi_gnc.errors import FlightError, offer
 from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flight import Flight
@@ -78,7 +78,7 @@ class OneBuild:
         for key, value in values.items():
             places = [i for i, known in enumerate(self.keys) if known == key or known.startswith(f"{key}.")]
             if not places:
-                raise FlightError(f"{key!r} is no column of this build; there is {', '.join(self.keys)}")
+                raise FlightError(f"{key!r} is no column of this build; {offer(key, self.keys)}")
             numbers = real_array(key, value, FlightError).ravel()
             if numbers.size not in (1, len(places)):
                 raise FlightError(f"{key!r} stands for {len(places)} numbers, and {numbers.size} are given")

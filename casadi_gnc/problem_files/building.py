@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 
 from casadi_gnc.campaigns.dispersions import DispersionTable
-from casadi_gnc.errors import FlightError, GncError, LawError, ProblemError, RequirementError
+from casadi_gnc.errors import FlightError, GncError, LawError, ProblemError, RequirementError, offer
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import fitting
 from casadi_gnc.missions.actuation import Actuation
@@ -160,7 +160,7 @@ def _funnel(table: FunnelTable, parts: Parts) -> Funnel:
     """Return one of the mission's funnels; the start must lie inside."""
     measured = parts.plant.measurement
     if table.signal not in measured:
-        raise MisfitError(f"{table.signal!r} is not measured; there is {', '.join(measured.names)}", "signal")
+        raise MisfitError(f"{table.signal!r} is not measured; {offer(table.signal, measured.names)}", "signal")
     expected = measured.signal(table.signal).size
     if len(table.start) != expected:
         raise MisfitError(f"{len(table.start)} axes, but {table.signal} has {expected}", "start")

@@ -120,8 +120,7 @@ class Complaints:
 
 def shipped() -> list[str]:
     """Return the names of the problems that come with the installation, e.g. "huang2020/detumble"."""
-    root = assets.folder("problems")
-    return sorted(path.relative_to(root).with_suffix("").as_posix() for path in root.rglob("*.toml"))
+    return assets.problems()
 
 
 def locate(problem: str | Path) -> Path:

@@ -7,7 +7,7 @@ from enum import Enum
 
 import numpy as np
 
-from casadi_gnc.errors import SynthesisError
+from casadi_gnc.errors import SynthesisError, offer
 from casadi_gnc.synthesis.backends import Claim, Found
 from casadi_gnc.synthesis.certificate import Check, check, onto_equalities
 from casadi_gnc.synthesis.proofs import (
@@ -90,7 +90,7 @@ class LmiAnswer:
         if not self.status.holds:
             raise SynthesisError(self.sentence())
         if name not in self.unknowns:
-            raise SynthesisError(f"no unknown {name!r}; there is {', '.join(self.unknowns)}")
+            raise SynthesisError(f"no unknown {name!r}; {offer(name, self.unknowns)}")
         return self.unknowns[name]
 
     @property

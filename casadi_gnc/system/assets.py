@@ -20,3 +20,9 @@ def folder(name: Literal["codegen", "problems"]) -> Path:
         if candidate.is_dir():
             return candidate
     raise GncError(f"the installation lacks its {name}/ folder; install casadi-gnc again")
+
+
+def problems() -> list[str]:
+    """Return the names of the problems that come with the installation, e.g. "huang2020/detumble"."""
+    root = folder("problems")
+    return sorted(path.relative_to(root).with_suffix("").as_posix() for path in root.rglob("*.toml"))

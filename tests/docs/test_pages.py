@@ -7,7 +7,7 @@ from running_pages import ROOT, run, sections
 
 from casadi_gnc.problem_files.document import shipped
 
-PAGES = ["allocation", "check", "docking", "falsify", "flight_c", "margins", "synthesis"]
+PAGES = ["allocation", "check", "command_line", "docking", "falsify", "flight_c", "margins", "synthesis"]
 HEADS = [(f"{page}.md", sections(f"{page}.md")[0]) for page in PAGES]
 
 

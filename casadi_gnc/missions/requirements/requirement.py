@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.errors import RequirementError
+from casadi_gnc.errors import RequirementError, offer
 from casadi_gnc.missions.requirements import evaluating, syntax
 from casadi_gnc.missions.requirements.normal import Bound, bind
 from casadi_gnc.missions.requirements.parsing import parse, shortened
@@ -182,7 +182,7 @@ class Requirement:
             )
         if self.metric not in table:
             raise RequirementError(
-                f"{self.id} bounds {self.metric}, and there is {', '.join(table) or 'none'}", "metric"
+                f"{self.id} bounds {self.metric!r}, which is no metric; {offer(self.metric, table)}", "metric"
             )
         values = np.asarray(table[self.metric], dtype=float)
         above = np.inf if self.at_most is None else self.at_most - values

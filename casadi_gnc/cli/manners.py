@@ -1,0 +1,135 @@
+"""What all commands share: headings in the help, examples, `--quiet`, and messages that name the problem file."""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from casadi_gnc.cli import progress
+
+_Quiet = Annotated[
+    bool, typer.Option("--quiet", help="Print warnings and errors only, and what --json or a table asks for.")
+]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One command.
+
+    Parameters
+    ----------
+    run : function of the command; its docstring is the help.
+    heading : under which it stands in the list of commands.
+    short : what it does, in that list.
+    examples : command lines, without the program's name; they are shown, and a test parses them.
+    name : on the command line; the function's if left out.
+    is_about_a_file : whether errors must name the file given as `problem`.
+    gives_data : whether standard output is what was asked for even without --json.
+    """
+
+    run: Callable[..., None]
+    heading: str
+    short: str
+    examples: tuple[str, ...]
+    name: str = ""
+    is_about_a_file: bool = False
+    gives_data: bool = False
+
+    def add_to(self, app: typer.Typer, program: str) -> None:
+        """Make this a command of a program."""
+        command = _named(self.run) if self.is_about_a_file else self.run
+        app.command(
+            self.name or self.run.__name__,
+            short_help=self.short,
+            rich_help_panel=self.heading,
+            epilog="\b\nExamples:\n" + "\n".join(f"  {program} {line}" for line in self.examples),
+        )(quietly(command, gives_data=self.gives_data))
+
+
+class Grouped(TyperGroup):
+    """A list of commands under headings, in the order in which they were added."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands, none cut."""
+        headings: dict[str, list[tuple[str, str]]] = {}
+        for name in self.list_commands(ctx):
+            command = self.get_command(ctx, name)
+            if command is not None and not command.hidden:
+                heading = getattr(command, "rich_help_panel", None)
+                row = (name, command.get_short_help_str(formatter.width))
+                headings.setdefault(heading if isinstance(heading, str) else "Commands", []).append(row)
+        widest = max(len(name) for rows in headings.values() for name, _ in rows)
+        for heading, rows in headings.items():
+            with formatter.section(heading):
+                formatter.write_dl([(name.ljust(widest), told) for name, told in rows])
+
+
+def _named(command: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that names its problem file in whatever is wrong."""
+
+    @wraps(command)
+    def named(*arguments: Any, **options: Any) -> None:
+        from casadi_gnc.problem_files.boundary import about
+
+        with about(options["problem"]):
+            command(*arguments, **options)
+
+    return named
+
+
+def quietly(command: Callable[..., None], *, gives_data: bool = False) -> Callable[..., None]:
+    """Return a command that takes `--quiet` too."""
+
+    @wraps(command)
+    def heard(*arguments: Any, quiet: bool = False, **options: Any) -> None:
+        is_data = gives_data or bool(options.get("json"))
+        with (
+            progress.silenced() if quiet else contextlib.nullcontext(),
+            unheard() if quiet and not is_data else contextlib.nullcontext(),
+        ):
+            command(*arguments, **options)
+
+    signature = inspect.signature(command, eval_str=True)
+    told = inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_Quiet)
+    heard.__signature__ = signature.replace(parameters=[*signature.parameters.values(), told])  # type: ignore[attr-defined]
+    heard.__annotations__ = {name: one.annotation for name, one in heard.__signature__.parameters.items()}  # type: ignore[attr-defined]
+    return heard
+
+
+@contextlib.contextmanager
+def unheard() -> Iterator[None]:
+    """Throw away what is printed on standard output."""
+    with open(os.devnull, "w", encoding="utf-8") as nothing, contextlib.redirect_stdout(nothing):
+        yield
+
+
+def tell(sentence: str, *, aside: bool = True) -> None:
+    """Print what a user may want to know; aside: on standard error, since standard output has the data."""
+    if not aside:
+        typer.echo(sentence)
+    elif not progress.is_silenced():
+        typer.echo(sentence, err=True)
+
+
+def print_json(content: Any) -> None:
+    """Print plain data as JSON on standard output; what is no number JSON has none for."""
+    import json
+
+    typer.echo(json.dumps(content, indent=2, allow_nan=False))
+
+
+def tell_written(paths: Sequence[Path], *, json: bool) -> None:
+    """Print which files were written."""
+    if json:
+        print_json({"wrote": [str(path) for path in paths]})
+    else:
+        typer.echo(f"wrote {', '.join(map(str, paths))}")
