@@ -7,20 +7,41 @@ what was found with its certificate. A recipe of your own is derived from `Recip
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from casadi_gnc import synthesis
+from casadi_gnc.errors import ProblemError
 from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis import LmiAnswer, Synthesis
 from casadi_gnc.synthesis.recipes.shi2020_theorem1 import theorem1
-from casadi_gnc.tables.part import NonNegative, Part, Positive, Table
+from casadi_gnc.system.matrix_file import read_matrix
+from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Table
 
 
 class Recipe(Part):
-    """Base of all recipes."""
+    """Base of all recipes.
+
+    A key that takes a matrix also takes a file beside the problem file: "plant.csv", or "plant.mat:A".
+    """
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_files(cls, data: Any, info: ValidationInfo) -> Any:
+        if not isinstance(data, dict):
+            return data
+        folder, read = (info.context or {}).get("folder", Path()), dict(data)
+        for key, field in cls.model_fields.items():
+            if isinstance(data.get(key), str) and _takes_matrix(field.annotation):
+                try:
+                    read[key] = read_matrix(data[key], folder)
+                except ProblemError as error:
+                    raise MisfitError(str(error), key) from None
+        return read
 
     def run(self, backend: Any) -> Synthesis | LmiAnswer:
         """Return what was found by a back end (its name, or itself), certified."""
@@ -34,6 +55,18 @@ class Recipe(Part):
             half = np.array(found.pop("half_widths"))
             found["vertices"] = synthesis.box_vertices(-half, half)
         return found
+
+
+def _takes_matrix(annotation: Any) -> bool:
+    """Return whether a field holds a matrix and no text: a list of lists of numbers, or None."""
+    if get_origin(annotation) in (Union, UnionType, Annotated):
+        return any(map(_takes_matrix, get_args(annotation)))
+    return get_origin(annotation) is list and _is_row(get_args(annotation)[0])
+
+
+def _is_row(annotation: Any) -> bool:
+    inner = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+    return get_origin(inner) is list
 
 
 def _is_matrix(value: Any) -> bool:

@@ -25,14 +25,7 @@ def text_of(path: Path, *, largest: int = LARGEST) -> str:
     ProblemError
         For a file that is not there, cannot be opened, is no file, is too large, or is no UTF-8; with the line.
     """
-    try:
-        content = _bytes(path, largest)
-    except OSError as error:
-        raise ProblemError(f"cannot be read: {error.strerror or 'the system refuses'}", _short(path)) from None
-    except ValueError:  # a zero byte in the name
-        raise ProblemError("is no name of a file", _short(path)) from None
-    if len(content) > largest:
-        raise ProblemError(f"is larger than {largest / 1e6:g} MB; split it, or leave out what is not needed", path.name)
+    content = bytes_of(path, largest=largest)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -42,6 +35,19 @@ def text_of(path: Path, *, largest: int = LARGEST) -> str:
             "save the file as UTF-8",
             f"{path.name}, line {line}",
         ) from None
+
+
+def bytes_of(path: Path, *, largest: int) -> bytes:
+    """Return the content of a file; arguments and errors as for `text_of`, but for the characters."""
+    try:
+        content = _bytes(path, largest)
+    except OSError as error:
+        raise ProblemError(f"cannot be read: {error.strerror or 'the system refuses'}", _short(path)) from None
+    except ValueError:  # a zero byte in the name
+        raise ProblemError("is no name of a file", _short(path)) from None
+    if len(content) > largest:
+        raise ProblemError(f"is larger than {largest / 1e6:g} MB; split it, or leave out what is not needed", path.name)
+    return content
 
 
 def _bytes(path: Path, largest: int) -> bytes:

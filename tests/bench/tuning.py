@@ -27,7 +27,7 @@ from casadi_gnc.tuning.gains import gains_free
 MISSIONS = {
     "huang2019": (
         "huang2019/nominal", "pd_pinv", ["attitude_gain", "rate_gain"], "integral(mrp)", None,
-        [("truth.inertia_factor", [0.8, 1.2])],
+        [("truth.inertia_kg_m2.1.1", [10.0, 14.0]), ("truth.inertia_kg_m2.3.3", [19.0, 25.0])],
     ),
     "huang2020": (
         "huang2020/slew", "pd_pinv", ["attitude_gain", "rate_gain"], "integral(mrp)", 400.0,
@@ -37,7 +37,10 @@ MISSIONS = {
         "sun2018/without_observer", "tracking", ["position_slope", "attitude_slope", "force_damping", "torque_damping"],
         "integral(position_error) + integral(attitude_error)", None, [],
     ),
-    "shi2020": ("shi2020/docking", "iobc", ["approach_speed", "disturbance_gain"], "integral(miss)", None, []),
+    "shi2020": (
+        "shi2020/docking", "iobc", ["approach_speed", "disturbance_gain"], "integral(miss)", None,
+        [("initial.position_m.1", [-2.5, -1.5]), ("initial.position_m.2", [2.0, 3.0])],
+    ),
     "tao2019": (
         "tao2019/case1", "plain",
         ["attitude_error_gain", "attitude_rate_gain", "position_error_gain", "position_rate_gain"],
