@@ -29,7 +29,7 @@ _PREFIX = "casadi_gnc_guest_"
 
 @dataclass(frozen=True)
 class GuestFile:
-    """Hold a file of a user's code.
+    """Hold a file of a user's code, or of numbers that a problem file names.
 
     Parameters
     ----------
@@ -57,6 +57,20 @@ _KNOWN: dict[str, GuestFile] = {}
 
 #: Files that were used since `recorded` began, innermost last.
 _RECORDS: list[list[GuestFile]] = []
+
+
+#: Folders in which files of numbers are looked for, innermost last.
+_FOLDERS: list[Path] = []
+
+
+@contextmanager
+def looking_in(folder: Path) -> Iterator[None]:
+    """Look for files of numbers in a folder, as long as it lasts; otherwise in the current one."""
+    _FOLDERS.append(folder)
+    try:
+        yield
+    finally:
+        _FOLDERS.pop()
 
 
 @contextmanager
@@ -107,7 +121,30 @@ def read(reference: str, folder: Path) -> GuestFile:
     inside = PurePosixPath(path)
     if not colon or not path.startswith("./") or inside.suffix != ".py" or not name.isidentifier():
         raise GuestError(f'{reference!r} names no code of your own; write "./file.py:Class", beside the problem file')
-    if ".." in inside.parts:
+    return _file(reference, inside, folder)
+
+
+def data(reference: str) -> Path:
+    """Return where a file of numbers lies that a problem file names; it is then part of the mission, like code.
+
+    It lies in the folder of `looking_in` or below it.
+
+    Raises
+    ------
+    GuestError
+        For a file that is not there, or leads out of the folder.
+    """
+    inside, folder = PurePosixPath(reference), _FOLDERS[-1] if _FOLDERS else Path()
+    file = _file(reference, inside, folder)
+    for record in _RECORDS:
+        if file not in record:
+            record.append(file)
+    return folder / inside
+
+
+def _file(reference: str, inside: PurePosixPath, folder: Path) -> GuestFile:
+    """Return a file that lies in a folder or below it; raise `GuestError` where there is none."""
+    if inside.is_absolute() or ".." in inside.parts:
         raise GuestError(f"{reference!r} leads out of the problem file's folder; put the file there or below it")
     target = folder / inside
     if not target.is_file():
@@ -199,4 +236,5 @@ def files_of(*objects: Any) -> tuple[GuestFile, ...]:
 def run_all(files: Iterable[GuestFile]) -> None:
     """Run guests' files that are not: what a pickle needs before its objects can be made."""
     for file in files:
-        run(file)
+        if file.path.endswith(".py"):  # others are numbers
+            run(file)

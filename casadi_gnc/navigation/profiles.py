@@ -29,6 +29,27 @@ MOST_ROWS = 200
 COLUMNS = ["t", "q0", "q1", "q2", "q3"]
 
 
+def _flaw(times: Sequence[float], rows: Sequence[Sequence[float]], i: int) -> str:
+    """Return what is wrong with row i of a table, or nothing."""
+    row = rows[i]
+    if not math.isfinite(times[i]):
+        return f"row {i + 1} of the table is at {times[i]:g} s, expected a time"
+    if len(row) != 4 or not abs(sum(each * each for each in row) - 1) < 1e-5:
+        return f"row {i + 1} of the table, {list(row)}, is no unit quaternion of four numbers, scalar first"
+    if i == 0:
+        return ""
+    if not times[i] > times[i - 1]:
+        return f"row {i + 1} of the table is at {times[i]:g} s, not after row {i}, {times[i - 1]:g} s"
+    near = abs(sum(a * b for a, b in zip(row, rows[i - 1], strict=True)))
+    if near < math.cos(math.pi / 4):
+        turn = math.degrees(2 * math.acos(min(1.0, near)))
+        return (
+            f"the table jumps by {turn:.0f} degrees from {times[i - 1]:g} s to {times[i]:g} s, "
+            "expected at most 90 from row to row; give rows in between"
+        )
+    return ""
+
+
 @dataclass(frozen=True, eq=False)
 class Slew(Reference):
     """Turn from one attitude to another about their common axis, at most at a rate and with an acceleration.
@@ -129,20 +150,10 @@ class Table(Reference):
                 f"a table of {len(times)} times and {len(rows)} attitudes, expected as many, 2 to {MOST_ROWS} rows"
             )
         for i, row in enumerate(rows):
-            if len(row) != 4 or not abs(sum(each * each for each in row) - 1) < 1e-5:
-                raise LawError(f"row {i + 1} of the table, {row}, is no unit quaternion of four numbers, scalar first")
-            if i == 0:
-                continue
-            if not times[i] > times[i - 1]:
-                raise LawError(f"row {i + 1} of the table is at {times[i]:g} s, not after row {i}, {times[i - 1]:g} s")
-            near = sum(a * b for a, b in zip(row, rows[i - 1], strict=True))
-            if abs(near) < math.cos(math.pi / 4):
-                turn = math.degrees(2 * math.acos(min(1.0, abs(near))))
-                raise LawError(
-                    f"the table jumps by {turn:.0f} degrees from {times[i - 1]:g} s to {times[i]:g} s, "
-                    "expected at most 90 from row to row; give rows in between"
-                )
-            if near < 0:
+            flaw = _flaw(times, rows, i)
+            if flaw:
+                raise LawError(flaw)
+            if i > 0 and sum(a * b for a, b in zip(row, rows[i - 1], strict=True)) < 0:
                 rows[i] = [-each for each in row]
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "quaternions", rows)
@@ -154,15 +165,20 @@ class Table(Reference):
         Raises
         ------
         ProblemError
-            For a file that cannot be read, another line of names, and what is no number, with the line.
+            For a file that cannot be read, another line of names, what is no number, and a row that is no attitude or
+            does not follow the one before; with the line.
         LawError
-            For what is no table of attitudes.
+            For too few rows, or too many.
         """
         table = csv_file.read_table(Path(path))
         if table.names != COLUMNS:
             told = f"has the columns {', '.join(table.names)}, expected {', '.join(COLUMNS)}"
             raise ProblemError(told, f"{table.path.name}, line {table.line}")
         rows = table.column_numbers(COLUMNS)
+        for i, (line, _) in enumerate(table.rows):
+            flaw = _flaw([row[0] for row in rows], [row[1:] for row in rows], i)
+            if flaw:
+                raise ProblemError(flaw, f"{table.path.name}, line {line}")
         return cls([row[0] for row in rows], [row[1:] for row in rows])
 
     def at(self, t: Any, known: Any) -> Wanted:

@@ -77,7 +77,7 @@ def load(problem: str | Path, changes: Mapping[str, Any] | None = None, *, stric
 def load_document(document: Document, changes: Mapping[str, Any] | None = None, *, strict: bool = True) -> Mission:
     """Return the mission of a document; arguments and errors as for `load`."""
     changes = changes or {}
-    with guests.recorded() as files, about(document):
+    with guests.recorded() as files, guests.looking_in(document.folder), about(document):
         checked = check_tables(document, changes)
         mission = building.mission(checked, strict=strict)
     origin = Origin(document.path.name, document.text, dict(changes), tuple(files), document.folder)

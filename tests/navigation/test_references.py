@@ -127,6 +127,10 @@ def test_a_table_comes_from_a_file(tmp_path):
         ("t,a,b,c,d\n", "attitudes.csv, line 1: has the columns t, a, b, c, d, expected t, q0, q1, q2, q3"),
         ("t,q0,q1,q2,q3\n0,1,0,0,x\n", "attitudes.csv, line 2, column q3: 'x' is no number"),
         ("t,q0,q1,q2,q3\n0,1,0,0,0\n", "1 times and 1 attitudes"),
+        ("t,q0,q1,q2,q3\n\n# note\n0,1,0,0,0\n0,1,0,0,0\n", "attitudes.csv, line 5: row 2 of the table is at 0 s"),
+        ("t,q0,q1,q2,q3\n0,1,0,0,0\n1,1,1,0,0\n", "attitudes.csv, line 3: row 2 of the table, .* is no unit"),
+        ("t,q0,q1,q2,q3\n0,1,0,0,0\n9,0,1,0,0\n", "attitudes.csv, line 3: the table jumps by 180 degrees"),
+        ("t,q0,q1,q2,q3\n0,1,0,0,0\nnan,1,0,0,0\n", "attitudes.csv, line 3: row 2 of the table is at nan s"),
     ):
         file.write_text(text)
         with pytest.raises(GncError, match=told):

@@ -1,13 +1,15 @@
 """Sensors, estimators, references and plates of a satellite, as a file may not say them: a sentence each."""
 
+import pickle
 import tomllib
+from typing import Any
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import casadi_gnc
-from casadi_gnc.errors import GncError
+from casadi_gnc.errors import GncError, ProblemError
 from casadi_gnc.problem_files.document import read
 from casadi_gnc.vehicles.satellite import SatelliteCraft
 
@@ -111,3 +113,34 @@ def test_the_shipped_file_is_what_its_readers_see():
     mission = casadi_gnc.load("satellites/earth_pointing")
     assert "mrp" not in mission.truth.measurement
     assert {"gyro", "star_tracker", "star_tracker_valid"} <= set(mission.truth.measurement.names)
+
+
+def test_a_table_comes_from_a_file_beside_the_problem(tmp_path):
+    """The same rows as in the problem file are the same mission; the file is part of it, and of its digest."""
+    rows = "t,q0,q1,q2,q3\n0,1,0,0,0\n60,0.8,0,0.6,0\n400,0.6,0,0.8,0\n"
+    (tmp_path / "pointing").mkdir()
+    (tmp_path / "pointing" / "day.csv").write_text(rows)
+    problem = tmp_path / "sat.toml"
+    text = read("satellites/slew").text
+    own = {"kind": "table", "file": "pointing/day.csv"}
+    problem.write_text(text)
+    mission = casadi_gnc.load(problem, {"reference": [own]})
+    craft: Any = mission.craft
+    (table,) = craft.reference
+    assert table.times_s == [0.0, 60.0, 400.0]
+    assert mission.guests()[-1].text == rows
+    (tmp_path / "pointing" / "day.csv").write_text(rows.replace("400", "500"))
+    assert casadi_gnc.load(problem, {"reference": [own]}).digest != mission.digest
+    assert pickle.loads(pickle.dumps(mission)).digest == mission.digest
+    for name, told in (
+        ("../day.csv", "leads out of the problem file's folder"),
+        ("/etc/hosts", "leads out of the problem file's folder"),
+        ("gone.csv", "there is no file gone.csv in"),
+    ):
+        with pytest.raises(ProblemError, match=rf"reference.*file.*{told}"):
+            casadi_gnc.load(problem, {"reference": [{**own, "file": name}]})
+    (tmp_path / "pointing" / "day.csv").write_text(rows + "500,1,1,0,0\n")
+    with pytest.raises(ProblemError, match=r"day\.csv, line 5: row 4 of the table"):
+        casadi_gnc.load(problem, {"reference": [own]})
+    with pytest.raises(ProblemError, match="the rows are in the file; leave times_s and quaternions_scalar_first out"):
+        casadi_gnc.load(problem, {"reference": [{**own, "times_s": [0.0, 1.0]}]})

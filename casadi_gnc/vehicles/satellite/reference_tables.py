@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from casadi_gnc.errors import LawError
+from casadi_gnc import guests
+from casadi_gnc.errors import GncError, LawError
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.navigation import GroundTarget, Inertial, Nadir, Reference, Slew, SunPointing, Table, Timeline
 from casadi_gnc.tables import matrices
@@ -84,12 +85,29 @@ class SlewTable(Part):
 
 
 class TableTable(Part):
-    """A spline through attitudes from the inertial frame at given times."""
+    """A spline through attitudes from the inertial frame at given times, told here or in a CSV file."""
 
     kind: Literal["table"]
     from_s: NonNegative = Field(default=0.0, description="time from which it counts")
-    times_s: list[float] = Field(description="rising")
-    quaternions_scalar_first: list[Quaternion]
+    file: str | None = Field(
+        default=None, description="CSV with the columns t, q0, q1, q2, q3, scalar first; beside the problem file"
+    )
+    times_s: list[float] = Field(default=[], description="rising")
+    quaternions_scalar_first: list[Quaternion] = []
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, told: Any) -> Any:
+        if not isinstance(told, dict) or not isinstance(told.get("file"), str):
+            return told
+        if "times_s" in told or "quaternions_scalar_first" in told:
+            raise MisfitError("the rows are in the file; leave times_s and quaternions_scalar_first out", "file")
+        try:
+            read = Table.read(guests.data(told["file"]))
+        except GncError as error:
+            raise MisfitError(str(error), "file") from None
+        rows = [list(row) for row in read.quaternions]
+        return {**told, "times_s": list(read.times), "quaternions_scalar_first": rows}
 
     def reference(self, epoch: Epoch | None) -> Reference:
         """Return the reference."""
