@@ -11,9 +11,9 @@ h           base period of the flight, [s]: random walks grow by their density t
 n           standard normal numbers, fresh at every sample
 ==========  ================================================================================
 
-What is measured at sample k is true at that sample: there is no delay. A sensor with a longer `period` speaks at whole
-multiples of it; with a period, drop-outs or a limited view it has a signal NAME_valid that is 1 where its
-value may be used, and 0 where it may not.
+What is measured at sample k was true `delay` samples before; at the start of a flight, what is true then. A sensor with
+a longer `period` looks at whole multiples of it; with a period, drop-outs or a limited view it has a signal NAME_valid
+that is 1 where its value may be used, and 0 where it may not.
 
 Gyro: Farrenkopf (1978), doi:10.2514/3.55779, with the noise of a sample arw/sqrt(h) and the bias's walk rrw sqrt(h).
 """
@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
@@ -33,6 +33,8 @@ from casadi_gnc.mechanics import quaternions
 from casadi_gnc.signals import Layout, Signal
 
 _NONE = (0.0, 0.0, 0.0)
+#: Longest delay, [samples]: all of them are states of the plant.
+LATEST = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +47,17 @@ class Sensor:
     hold : base period of the flight, [s], as a mission sets it; until then 0, and no random walk.
     period : between two of its values, [s], a whole multiple of `hold`; 0: `hold`.
     dropout : chance that a value which is due does not come, 0 to below 1.
+    delay : samples of the flight from the look to the value, at most `LATEST`.
     """
+
+    #: States of the plant by which the truth that it looks at can be told.
+    looks_at: ClassVar[tuple[str, ...]] = ()
 
     name: str
     hold: float = field(default=0.0, kw_only=True)
     period: float = field(default=0.0, kw_only=True)
     dropout: float = field(default=0.0, kw_only=True)
+    delay: int = field(default=0, kw_only=True)
 
     def __post_init__(self) -> None:
         if self.hold and self.period and abs(self.period / self.hold - self.every) > 1e-9 * self.every:
@@ -60,6 +67,8 @@ class Sensor:
             )
         if not 0 <= self.dropout < 1:
             raise FlightError(f"{self.name}: the chance of a drop-out is {self.dropout:g}, expected 0 to below 1")
+        if not 0 <= self.delay <= LATEST:
+            raise FlightError(f"{self.name}: a delay of {self.delay} samples, expected 0 to {LATEST}")
 
     @property
     def every(self) -> int:
@@ -114,8 +123,8 @@ class Sensor:
 
         Parameters
         ----------
-        truth : by name: quaternion, rate, and what the sensor looks at of wheel_speed, magnetic_field (body, [T]),
-            sun (unit vector, body) and sunlight (0 to 1).
+        truth : as it was `delay` samples ago, by name: quaternion, rate, and what the sensor looks at of wheel_speed,
+            magnetic_field (body, [T]), sun (unit vector, body) and sunlight (0 to 1).
         """
         value, seen = self.read(truth, own, getattr(drawn, f"{self.name}_noise"))
         found = {self.value.name: value}
@@ -133,7 +142,9 @@ class Sensor:
         if self.every == 1:
             return ca.SX(1)
         sample = ca.floor(t / self.hold + 0.5)
-        return ca.fabs(sample - self.every * ca.floor((sample + 0.5) / self.every)) < 0.5
+        looked = sample - self.delay
+        due = ca.fabs(looked - self.every * ca.floor((looked + 0.5) / self.every)) < 0.5
+        return ca.logic_or(due, sample < 0.5) if self.delay else due
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,6 +160,8 @@ class Gyro(Sensor):
     misalignment : small turn of the triad from the body, (3,), [rad]; M = (I + diag(scale)) (I - [misalignment]x).
     range : largest rate of an axis that it can tell, [rad/s].
     """
+
+    looks_at = ("rate",)
 
     angle_random_walk: float = 0.0
     bias_random_walk: float = 0.0
@@ -200,6 +213,8 @@ class StarTracker(Sensor):
     max_rate : rate of the body, [rad/s], beyond which it finds no attitude.
     """
 
+    looks_at = ("mrp", "rate")
+
     mounting: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0)
     across: float = 0.0
     about: float = 0.0
@@ -240,6 +255,8 @@ class Magnetometer(Sensor):
     bias : what is left after calibration, (3,), [T].
     """
 
+    looks_at = ("mrp", "position")
+
     deviation: float = 0.0
     bias: tuple[float, ...] = _NONE
 
@@ -263,6 +280,8 @@ class SunSensor(Sensor):
     axis : middle of the view, unit vector, (3,), body axes.
     view : half angle of the cone that is seen, [rad]; pi: all around, as several sensors together see.
     """
+
+    looks_at = ("mrp", "position")
 
     deviation: float = 0.0
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
@@ -297,6 +316,8 @@ class Tachometers(Sensor):
     quantum : least difference that is told, [rad/s]; 0: none.
     max_speed : beyond which no value is true, [rad/s].
     """
+
+    looks_at = ("wheel_speed",)
 
     count: int = field(kw_only=True)
     deviation: float = 0.0

@@ -26,6 +26,8 @@ abs(a)^3/48 and needs no trigonometry. A measurement that is further from the es
 is
 left out; after `patience` samples of which none fits, the filter goes on with its first covariance.
 
+A tracker that is late is compared with the attitude of then: this one, turned back by what the gyro has told since.
+
 A direction is linear in small errors only: what is left out is of the size of a^2/2, and is taken for further noise
 of the variance (trace P_aa/2)^2, which vanishes as the filter settles (underweighting).
 
@@ -94,6 +96,9 @@ class Mekf(Estimator):
             raise LawError(f"{self.magnetometers[0].name}: the filter knows no field to compare with; give one")
         if self.sun_sensors and self.sun is None:
             raise LawError(f"{self.sun_sensors[0].name}: the filter does not know where the sun is; give an epoch")
+        late = [each.name for each in (self.gyro, *self.magnetometers, *self.sun_sensors) if each.delay]
+        if late:
+            raise LawError(f"{late[0]} is late, which the filter bears of star trackers alone; leave its delay out")
         for name, value in self._noises():
             if not (value > 0 and math.isfinite(value)):
                 raise LawError(f"{name} is {value:g} for the filter, expected more than 0: what it takes for its noise")
@@ -124,8 +129,14 @@ class Mekf(Estimator):
                 Signal("last_gyro", 3, "rad/s"),
                 Signal("begun"),
                 Signal("misfits"),
+                *((Signal("turns", 4 * self._latest, "-"),) if self._latest else ()),
             )
         )
+
+    @property
+    def _latest(self) -> int:
+        """Samples by which the latest tracker is late: so many turns are remembered, the last one first."""
+        return max((each.delay for each in self.trackers), default=0)
 
     @property
     def outputs(self) -> Layout:
@@ -154,16 +165,18 @@ class Mekf(Estimator):
             last_gyro=getattr(now, self.gyro.name),
             begun=ca.DM(0),
             misfits=ca.DM(0),
+            **({"turns": ca.DM([1.0, 0.0, 0.0, 0.0] * self._latest)} if self._latest else {}),
         )
 
     def jump(self, t: Any, y: Any, m: Any, hold: float) -> Any:
         """Return the memory at this sample: moved on by the gyro, then corrected by what is valid."""
         now, memory = self.inputs.split(y), self.memory.split(m)
         gyro = getattr(now, self.gyro.name)
-        attitude, factors = self._moved(memory, gyro, hold * memory.begun)
+        moved, attitude, factors = self._moved(memory, gyro, hold * memory.begun)
+        turns = ca.vertcat(moved, memory.turns[:-4]) if self._latest else ca.SX(0, 1)
         error: list[Any] = [ca.SX(0)] * _SIZE
         used, offered = ca.SX(0), ca.SX(0)
-        for one in self._observations(t, now, attitude):
+        for one in self._observations(t, now, attitude, turns):
             unsure = factors.variance(0) + factors.variance(1) + factors.variance(2)
             if one.is_direction:
                 one = replace(one, variances=[variance + unsure * unsure / 4 for variance in one.variances])
@@ -180,10 +193,11 @@ class Mekf(Estimator):
             last_gyro=gyro,
             begun=ca.DM(1),
             misfits=ca.if_else(lost, 0.0, misfits),
+            **({"turns": turns} if self._latest else {}),
         )
 
-    def _moved(self, memory: Any, gyro: Any, h: Any) -> tuple[Any, Factors]:
-        """Return attitude and covariance a time h [s] on."""
+    def _moved(self, memory: Any, gyro: Any, h: Any) -> tuple[Any, Any, Factors]:
+        """Return the turn of a time h [s], and attitude and covariance after it."""
         turn = ((memory.last_gyro + gyro) / 2 - memory.gyro_bias) * h
         # tan(x/4) = x/4 (1 + x^2/48 + ...): a turn by 0.1 rad is exact to 2e-9 rad.
         moved = quaternions.from_mrp(turn / 4 * (1 + ca.sumsqr(turn) / 48))
@@ -193,16 +207,21 @@ class Mekf(Estimator):
         transition[:3, 3:] = -h * (ca.DM.eye(3) - ca.skew(turn) / 2)
         arw, rrw = self.gyro.angle_random_walk**2, self.gyro.bias_random_walk**2
         noise = [arw * h + rrw * h * h * h / 3] * 3 + [rrw * h] * 3
-        return attitude, Factors.unpacked(memory.covariance, _SIZE).moved(transition, noise)
+        return moved, attitude, Factors.unpacked(memory.covariance, _SIZE).moved(transition, noise)
 
-    def _observations(self, t: Any, now: Any, attitude: Any) -> list[_Observation]:
+    def _observations(self, t: Any, now: Any, attitude: Any, turns: Any) -> list[_Observation]:
         """Return what the sensors say of the error, before any of it is used."""
         found = []
         for tracker in self.trackers:
             seen, mounting = getattr(now, tracker.name), array(tracker.mounting)
-            difference = 4 * quaternions.to_mrp(quaternions.relative(seen, attitude))
+            then = attitude
+            for i in range(tracker.delay):
+                then = quaternions.compose(quaternions.conjugate(turns[4 * i : 4 * i + 4]), then)
+            difference = 4 * quaternions.to_mrp(quaternions.relative(seen, then))
             variances = [deviation**2 for deviation in tracker.deviations]
             slope, turned = quaternions.dcm(mounting), quaternions.turned(mounting, difference)
+            if tracker.delay:  # what is wrong now was wrong then, in the axes of then
+                slope = ca.mtimes(slope, quaternions.dcm(quaternions.relative(then, attitude)))
             found.append(_Observation(slope, turned, variances, _valid(now, tracker, seen)))
         for magnetometer in self.magnetometers:
             assert self.field is not None

@@ -229,7 +229,11 @@ class SatelliteCraft(Craft):
         mrp = quaternions.to_mrp(turned)
         sensed = {name: value for sensor in self._sensors() for name, value in sensor.start().items()}
         first = {"mrp": mrp, "rate": rate, **parts, **place, **sensed}
-        return {name: array(value).elements() for name, value in first.items()}
+        found = {name: array(value).elements() for name, value in first.items()}
+        # Sensors that are late look at it as if it had been so before.
+        latest = max((sensor.delay for sensor in self._sensors()), default=0)
+        looked_at = {name for sensor in self._sensors() if sensor.delay for name in sensor.looks_at}
+        return {**found, **{f"{name}_past": (latest + 1) * found[name] for name in looked_at}}
 
     def belief(self) -> RigidBody:
         """Return the body as known, with its wheels."""

@@ -88,7 +88,11 @@ class Satellite(Plant):
 
     @cached_property
     def state(self) -> Layout:
-        """Attitude, rate, the parts' states, the orbit's, the sensors'."""
+        """Attitude, rate, the parts' states, the orbit's, the sensors', and what sensors that are late remember."""
+        return self._own + past(self._own, self.sensors)
+
+    @cached_property
+    def _own(self) -> Layout:
         own = (Signal("mrp", 3, "-", FRAME, kind="mrp"), Signal("rate", 3, "rad/s", FRAME, kind="rate"))
         return Layout(
             (*own, *self.assembly.state.signals, *self.surroundings.state.signals, *self._of_sensors("state"))
@@ -148,9 +152,17 @@ class Satellite(Plant):
         now = self.state.split(x)
         truth, drawn, told = self._around(t, now), self.noise.split(noise), {}
         for sensor in self.sensors:
-            told.update(sensor.measure(t, truth, now, drawn))
+            told.update(sensor.measure(t, self._seen(t, now, sensor) if sensor.delay else truth, now, drawn))
         exact = {name: getattr(truth, name) for name in self._exact.names if name not in told}
         return self.measurement.pack(**{name: (told.get(name, exact.get(name))) for name in self.measurement.names})
+
+    def _seen(self, t: Any, now: Any, sensor: Any) -> SimpleNamespace:
+        """Return what a sensor that is late looked at."""
+        then = dict(vars(now))
+        for name in sensor.looks_at:
+            size = self._own.signal(name).size
+            then[name] = getattr(now, f"{name}_past")[sensor.delay * size : (sensor.delay + 1) * size]
+        return self._around(t - sensor.delay * sensor.hold, SimpleNamespace(**then))
 
     def rate(self, t: Any, x: Any, actuators: Any, noise: Any) -> Any:
         """Return x'."""
@@ -166,13 +178,20 @@ class Satellite(Plant):
         rates.update(self.surroundings.moved(now, (force + pushed) / self.assembly.mass))
         for sensor in self.sensors:
             rates.update(sensor.rate(t, now, drawn))
+        for signal in past(self._own, self.sensors).signals:
+            rates[signal.name] = ca.SX.zeros(signal.size)
         return self.state.pack(mrp=attitude.mrp_rate(now.mrp, now.rate), rate=turned, **rates)
 
     def settle(self, x: Any) -> Any:
         """Return the same physical state in the representation kept between steps (|sigma| <= 1)."""
         now = self.state.split(x)
         moved = {name: value for part in self.assembly.components for name, value in part.settle(now).items()}
-        return self.state.pack(**{**vars(now), **moved, "mrp": attitude.short_way(now.mrp)})
+        settled = {**vars(now), **moved, "mrp": attitude.short_way(now.mrp)}
+        for signal in past(self._own, self.sensors).signals:
+            name = signal.name.removesuffix("_past")
+            kept = settled[signal.name]
+            settled[signal.name] = ca.vertcat(settled[name], kept[: signal.size - self._own.signal(name).size])
+        return self.state.pack(**settled)
 
     def show(self, t: Any, x: Any, actuators: Any) -> dict[str, Any]:
         """Return the pointing error and the momentum."""
@@ -193,3 +212,11 @@ class Satellite(Plant):
             for bit, flag in part.flags(now, told).items():
                 flags[bit] = ca.logic_or(flags[bit], flag) if bit in flags else flag
         return flags
+
+
+def past(own: Layout, sensors: tuple[Any, ...]) -> Layout:
+    """Return what sensors that are late look at, now and at the samples before: for each state, the last one first."""
+    latest = max((sensor.delay for sensor in sensors), default=0)
+    names = {name for sensor in sensors if sensor.delay for name in sensor.looks_at}
+    kept = (signal for signal in own.signals if signal.name in names)
+    return Layout(tuple(Signal(f"{each.name}_past", each.size * (latest + 1), each.unit) for each in kept))

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from casadi_gnc.errors import FlightError
-from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, Sensor, StarTracker, SunSensor, Tachometers
+from casadi_gnc.mechanics.sensors import LATEST, Gyro, Magnetometer, Sensor, StarTracker, SunSensor, Tachometers
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive, Vector
 
@@ -25,13 +25,16 @@ class SensorTable(Part):
         default=0.0, description="between values, whole multiple of the sample period; 0: that"
     )
     dropout: Annotated[float, Field(ge=0, lt=1)] = Field(default=0.0, description="chance that a value does not come")
+    delay_samples: Annotated[int, Field(ge=0, le=LATEST)] = Field(
+        default=0, description="of the flight, from the look to the value"
+    )
 
     def sensor(self, wheels: int) -> Sensor:
         """Return the sensor, on a satellite of so many wheels."""
         raise TypeError(f"{type(self).__name__} defines no sensor")
 
-    def _shared(self) -> dict[str, float]:
-        return {"period": self.period_s, "dropout": self.dropout}
+    def _shared(self) -> dict[str, Any]:
+        return {"period": self.period_s, "dropout": self.dropout, "delay": self.delay_samples}
 
 
 class GyroTable(SensorTable):
