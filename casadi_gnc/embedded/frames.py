@@ -54,7 +54,7 @@ FRAMES = {
     ),
     "xtce": Frame(
         {"{name}.xml": "xtce.xml.j2", "{name}_telemetry.h": "telemetry.h.j2", "{name}_telemetry.c": "telemetry.c.j2"},
-        "The structs of this package as space packets (CCSDS 133.0-B): their definition in XTCE 1.2, and a packer in C.",
+        "The structs of this package as space packets (CCSDS 133.0-B): a definition in XTCE 1.2, and a packer in C.",
     ),
 }
 
