@@ -14,6 +14,15 @@ from casadi_gnc.embedded.scalars import Math, Real, c_constant
 from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout
 
+#: Bits that the C raises where it is called otherwise than it must be, by value: name and sentence.
+MISUSE = {
+    1 << 27: (
+        "TIME_SHIFTED",
+        "The time did not advance by the period; the memory was advanced by one period all the same.",
+    ),
+    1 << 28: ("NOT_INITIALISED", "Parameters or state were not initialised, or are damaged; the outputs are zero."),
+}
+
 
 @dataclass(frozen=True)
 class Tunable:
@@ -124,6 +133,11 @@ class Controller:
         for tape in self.tapes.values():
             if any(not math.isfinite(tape.instruction_constant(k)) for k in _constants(tape)):
                 raise PackageError(f"the law of scheme {self.scheme} has a constant that is not finite")
+
+    @property
+    def raised(self) -> dict[int, tuple[str, str]]:
+        """Every bit of the status, as `statuses`: those of the controller, and those of misuse."""
+        return {**self.statuses, **MISUSE}
 
     @property
     def outputs(self) -> Layout:

@@ -70,6 +70,15 @@ class Packable(Protocol):
         ...
 
 
+#: What every state ends with.
+_COUNTERS = (
+    Entry("last_time", "last_time", 1, "real", "s", "of the last step"),
+    Entry("started", "started", 1, "uint32", "", "0 until the first good measurement"),
+    Entry("stepped", "stepped", 1, "uint32", "", "0 until the first step"),
+    Entry("ready", "ready", 1, "uint32", "", "a pattern once it is reset"),
+)
+
+
 def _real(options: Options) -> str:
     return {"double": "float64", "float": "float32"}[options.real]
 
@@ -115,7 +124,7 @@ class PackableController:
             options.name, own.title, own.scheme, _real(options), own.period, calls(options.name), ("state", "params"),
             (Entry("time", "time", 1, "real", "s", "since the start of the mission"), *entries(own.measured)),
             (*entries(own.outputs), STATUS),
-            (*state, Entry("started", "started", 1, "uint32", "", "0 until the first good measurement")),
+            (*state, *_COUNTERS),
             tuple(
                 Entry(
                     one.name, one.name, len(one.default), "real", one.unit, one.note,
@@ -123,7 +132,7 @@ class PackableController:
                 )
                 for one in own.tunables
             ),
-            bits(own.statuses),
+            bits(own.raised),
         )  # fmt: skip
 
     def replay_header(self, options: Options, steps: int) -> str:

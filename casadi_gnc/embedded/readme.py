@@ -51,7 +51,7 @@ def render_readme(
         usage=render_usage(controller, options).rstrip(),
         inputs=members(controller.measured),
         outputs=output_members(controller),
-        statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.statuses.items()],
+        statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.raised.items()],
         tunables=rows,
         watched=[
             {"name": one.name, "id": one.id, "asked": one.asked, "unit": one.unit or "-", "delay": f"{one.delay:g}"}

@@ -63,7 +63,7 @@ def render_header(controller: Controller, options: Options) -> str:
         **_common(controller, options),
         period=options.constant(controller.period),
         sizes=[{"name": name, "value": value} for name, value in sizes.items()],
-        statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.statuses.items()],
+        statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.raised.items()],
         measured=members(controller.measured),
         outputs=output_members(controller),
         state=state,
@@ -93,6 +93,11 @@ def render_source(controller: Controller, options: Options) -> str:
     return template("package_source.c.j2").render(
         **_common(controller, options),
         maths=options.maths,
+        period=options.constant(controller.period),
+        zero=options.constant(0.0),
+        half=options.constant(0.5),
+        rounding=options.constant(4.0 * 2.0 ** (-23 if options.real == "float" else -52)),
+        largest=options.constant(1e30),
         count={
             "measured": controller.measured.size,
             "memory": controller.memory.size,
@@ -104,6 +109,7 @@ def render_source(controller: Controller, options: Options) -> str:
         calls=calls,
         reads_params=reads,
         tunables=controller.tunables,
+        tunable_places=[place for one in controller.tunables for place in access_tunable(one, "")],
         checks=_checks(controller, options),
         defaults=_defaults(controller, options),
         first=_copy(access(controller.measured, "state->good."), access(controller.measured, "input->")),

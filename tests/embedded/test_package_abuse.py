@@ -282,7 +282,7 @@ def test_memory_starts_at_the_first_good_measurement():
     inputs, _ = read_vectors(folder, "float64")
     host = HostPackage(folder, "detumble")
     fresh = host.replay(inputs[5:8], 19)
-    bad = as_numbers(inputs[:3].copy())
+    bad = as_numbers(inputs[2:5].copy())
     bad[:, 4:] = np.nan, np.inf, -1e300
     host.reset()
     first = host.replay(as_words(bad, host.word), 19)
