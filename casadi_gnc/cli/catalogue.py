@@ -34,7 +34,8 @@ def laws(
         typer.echo(f"  reads {', '.join(law['reads']) or 'what the craft gives'}; commands {_or(law['commands'])}"
                    + (f"; models a {law['models']}" if law["models"] else ""))  # fmt: skip
         _table(["gain", "symbol", "unit", "range", "default", "meaning"], [_gain(gain) for gain in law["gains"]])
-        typer.echo(f"  fits {', '.join(law['fits']) or 'no craft that is known'}")
+        fitting = [name + (f" as in {law['fits_as'][name]}" if name in law["fits_as"] else "") for name in law["fits"]]
+        typer.echo(f"  fits {', '.join(fitting) or 'no craft that is known'}")
         for craft, why in law["does_not_fit"].items():
             typer.echo(f"  not {craft}: {'; '.join(why)}")
 

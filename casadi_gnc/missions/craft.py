@@ -56,6 +56,8 @@ class Craft(Part):
     #: A problem that flies this craft, for catalogues: a shipped one, or the path of a mission file of a package.
     #: None where a craft is made without arguments.
     example: ClassVar[str | None] = None
+    #: Further ones with parts that the first has not: a law that reads what they measure fits the craft as in them.
+    further_examples: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, **keys: Any) -> None:
         try:

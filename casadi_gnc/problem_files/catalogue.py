@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
@@ -29,6 +30,7 @@ class Sample:
     read: Layout  # by laws: the measured signals, or those of a navigation
     effort: Layout
     belief: Any
+    further: tuple[str, ...] = ()  # examples of the craft with other parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +78,7 @@ def sample_of(craft: Named, problem: str | Path | None = None) -> Sample | None:
     kind: type[Craft] = craft.kind if isinstance(craft.kind, type) else type(craft.kind)
     try:
         if kind.example is not None:
-            mission = load(kind.example, strict=False)
-            return _sample(mission.parts_asked, mission.schemes[0].actuation.effort)
+            return replace(_of_example(kind.example), further=kind.further_examples)
         if problem is not None and _names(read_kind(problem, "mission"), craft.name):
             mission = load(problem, strict=False)
             return _sample(mission.parts_asked, mission.schemes[0].actuation.effort)
@@ -85,6 +86,12 @@ def sample_of(craft: Named, problem: str | Path | None = None) -> Sample | None:
         return _sample(Parts(made), made.actuation().effort)
     except GncError:
         return None
+
+
+@lru_cache(maxsize=16)
+def _of_example(name: str) -> Sample:
+    mission = load(name, strict=False)
+    return _sample(mission.parts_asked, mission.schemes[0].actuation.effort)
 
 
 def _sample(parts: Parts, effort: Layout) -> Sample:
@@ -96,10 +103,25 @@ def _names(document: Document, craft: str) -> bool:
 
 
 def fits(law: Named, sample: Sample | None) -> list[str] | None:
-    """Return why a law does not fit a craft, nothing where it does, None where nobody can say."""
+    """Return why a law does not fit a craft as in its example, nothing where it fits, there or as in a further one.
+
+    None where nobody can say.
+    """
     if sample is None:
         return None
-    return list(fitting.misfits(law.kind, sample.read, sample.belief, sample.effort))
+    why = list(fitting.misfits(law.kind, sample.read, sample.belief, sample.effort))
+    return [] if why and fits_as(law, sample) else why
+
+
+def fits_as(law: Named, sample: Sample | None) -> str:
+    """Return the further example of a craft in which a law fits that does not fit the first; else nothing."""
+    if sample is None or not any(fitting.misfits(law.kind, sample.read, sample.belief, sample.effort)):
+        return ""
+    for name in sample.further:
+        other = _of_example(name)
+        if not any(fitting.misfits(law.kind, other.read, other.belief, other.effort)):
+            return name
+    return ""
 
 
 def gains(law: type[Law]) -> Iterator[dict[str, Any]]:
@@ -181,6 +203,7 @@ def law_data(law: Named, samples: dict[str, Sample | None]) -> dict[str, Any]:
         "errata": dict(kind.errata),
         "gains": list(gains(kind)),
         "fits": [name for name, why in found.items() if why == []],
+        "fits_as": {name: as_in for name, sample in samples.items() if (as_in := fits_as(law, sample))},
         "does_not_fit": {name: why for name, why in found.items() if why},
         "unknown": [name for name, why in found.items() if why is None],
     }

@@ -6,6 +6,7 @@ from running_pages import ROOT
 
 from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.missions.craft import REGISTRY as CRAFTS
+from casadi_gnc.problem_files import catalogue
 from casadi_gnc.status import StepStatus
 
 
@@ -28,3 +29,13 @@ def test_pages_hold_every_law_craft_and_status(tmp_path, monkeypatch):
     catalogue_pages.write(tmp_path / "catalogue")
     assert stamps == {page: page.stat().st_mtime_ns for page in (tmp_path / "catalogue").iterdir()}
     sys.modules.pop("catalogue_pages")
+
+
+def test_a_law_fits_a_craft_as_in_the_example_that_measures_what_it_reads():
+    (satellite,) = [craft for craft in catalogue.crafts() if craft.name == "satellite"]
+    (bdot,) = [law for law in catalogue.laws() if law.name == "bdot"]
+    found = catalogue.law_data(bdot, {"satellite": catalogue.sample_of(satellite)})
+    assert found["fits"] == ["satellite"]
+    assert found["fits_as"] == {"satellite": "satellites/detumble_bdot"}
+    (plain,) = [law for law in catalogue.laws() if law.name == "mrp_feedback"]
+    assert not catalogue.law_data(plain, {"satellite": catalogue.sample_of(satellite)})["fits_as"]

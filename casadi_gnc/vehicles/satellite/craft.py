@@ -59,6 +59,7 @@ class SatelliteCraft(Craft):
     """A satellite of a rigid body and the parts that it carries; laws believe in it as known, liquids at rest."""
 
     example: ClassVar[str | None] = "satellites/slew"
+    further_examples: ClassVar[tuple[str, ...]] = ("satellites/detumble_bdot",)
 
     mass_kg: Positive = Field(description="with wheels and appendages, without [[slosh]]")
     inertia_kg_m2: matrices.Inertia = Field(
