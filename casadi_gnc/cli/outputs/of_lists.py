@@ -61,6 +61,8 @@ class Law(_Class):
     errata: dict[str, str]
     gains: list[Gain]
     fits: list[str]
+    fits_as: dict[str, str]
+    """By craft, the example in whose parts the law fits, where the first example has not all of them."""
     does_not_fit: dict[str, list[str]]
     """By craft, why."""
     unknown: list[str]
