@@ -19,6 +19,7 @@ from casadi_gnc.synthesis.conic import Block, ConicData, Kind, triangle
 
 _ORDER = {Kind.EQUAL: 0, Kind.NONNEGATIVE: 1, Kind.SEMIDEFINITE: 2}
 _ROUNDING = 1e-11  # of the largest coefficient: how far mirrored entries may differ by rounding
+_AT_ONCE = 64  # columns of the Jacobian that are evaluated together
 _TEXT = 160  # characters of a term that a message prints
 
 
@@ -48,12 +49,14 @@ def extract(unknowns: ca.SX, labels: tuple[str, ...], constraints: Sequence[Cons
     """
     ordered = sorted(constraints, key=lambda constraint: _ORDER[constraint.kind])
     stacked = ca.vertcat(*[ca.vec(ca.densify(constraint.expression)) for constraint in ordered], objective)
-    jacobian = ca.jacobian(stacked, unknowns)
     at_zero = ca.substitute(stacked, unknowns, ca.DM.zeros(*unknowns.shape))
-    if not (jacobian.is_constant() and at_zero.is_constant()):
-        _refuse_foreign(unknowns, ordered, objective)
-        _refuse_nonlinear(jacobian, unknowns, ordered, stacked)
-    entries: Any = ca.evalf(jacobian).sparse().tocoo()
+    entries: Any = _slopes(stacked, unknowns)
+    if entries is None or not at_zero.is_constant():
+        jacobian = ca.jacobian(stacked, unknowns)
+        if not (jacobian.is_constant() and at_zero.is_constant()):
+            _refuse_foreign(unknowns, ordered, objective)
+            _refuse_nonlinear(jacobian, unknowns, ordered, stacked)
+        entries = ca.evalf(jacobian).sparse().tocoo()
     constants = np.array(ca.evalf(at_zero)).ravel()
     if not (np.all(np.isfinite(entries.data)) and np.all(np.isfinite(constants))):
         _refuse_infinite(entries, constants, ordered)
@@ -75,6 +78,32 @@ def extract(unknowns: ca.SX, labels: tuple[str, ...], constraints: Sequence[Cons
     _symmetric(blocks, matrix, mirror, constants[lower], constants[upper], labels)
     cost = _rows(entries, np.array([first])).toarray()[0]
     return ConicData(tuple(blocks), matrix, constants[lower], cost, float(constants[first]), labels)
+
+
+def _slopes(stacked: ca.SX, unknowns: ca.SX) -> sp.coo_matrix | None:
+    """Return the Jacobian of an affine map, column by column: the derivative along one unknown after another.
+
+    None where it cannot be told from these that the map is affine, or where an entry is not finite. `ca.jacobian` would
+    build an expression for each entry; this one is built once, and evaluated.
+    """
+    along = ca.SX.sym("along", *unknowns.shape)
+    derivative = ca.jtimes(stacked, unknowns, along)
+    known = {symbol.element_hash() for symbol in ca.symvar(along)}
+    if any(symbol.element_hash() not in known for symbol in ca.symvar(derivative)):
+        return None
+    count = unknowns.numel()
+    evaluated, parts = ca.Function("derivative", [along], [ca.densify(derivative)]), []
+    for first in range(0, count, _AT_ONCE):
+        chosen = np.arange(first, min(first + _AT_ONCE, count))
+        units = np.zeros((count, len(chosen)))
+        units[chosen, np.arange(len(chosen))] = 1.0
+        columns = np.asarray(evaluated(units))
+        if not np.all(np.isfinite(columns)):
+            return None
+        part = sp.coo_matrix(columns)
+        parts.append((part.data, part.row, chosen[part.col]))
+    data, row, column = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return sp.coo_matrix((data, (row, column)), shape=(stacked.numel(), count))
 
 
 def _rows(entries: Any, rows: np.ndarray) -> sp.csr_matrix:

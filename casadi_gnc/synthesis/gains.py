@@ -104,7 +104,9 @@ class Synthesis:
         return said + self._between()
 
     def _between(self) -> str:
-        """Return a sentence where the smallest gamma is not known well, else nothing."""
+        """Return a sentence where the smallest gamma, or what else was minimised, is not known well, else nothing."""
+        if np.isnan(self.promised) and self.lmis.gap > _TOLD * abs(self.lmis.objective):
+            return f" What was minimised, {self.lmis.objective:.4g}, may be smaller, by up to {self.lmis.gap:.2g}."
         if self.smallest is None or self.smallest[0] >= (1 - _TOLD) * self.smallest[1]:
             return ""
         low, high = self.smallest

@@ -192,7 +192,7 @@ class Lmis:
             again = module.solve(tightened(scaled, verdict.point / scaled.unit, _TIGHTER[-1]), **options)
             other = verdict if again.claim is Claim.INFEASIBLE else judge(scaled, again, within)
             if other.status.holds:
-                return self._answer(data, backend, scaled.unit, other, again)
+                verdict, found = other, again
         if verdict.status in _LACKING:
             scaled, found, verdict = self._elsewhere(scaled, found, verdict, module, within, options)
         if verdict.status in _WORTH_ANOTHER_LOOK and np.all(np.isfinite(verdict.point)):

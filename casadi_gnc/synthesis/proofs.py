@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.csgraph import connected_components
 
 from casadi_gnc.synthesis.certificate import check
 from casadi_gnc.synthesis.conic import Block, ConicData, Kind, from_triangle, into_cone, to_triangle, triangle
@@ -28,6 +29,7 @@ _LONG = np.longdouble
 _EPS = float(np.finfo(_LONG).eps)
 _FACES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-9)  # shares of the largest eigenvalue below which one counts as zero
 _ZEROS = (1e-3, 1e-5, 0.0)  # shares of the largest entry of the factors below which one counts as zero
+_COUPLED = 1e-3  # times such a share: entries below it, beside the roots of their diagonals, couple nothing
 _STEPS = 12  # of Gauss and Newton's method, which doubles the digits
 Reach = float | Mapping[str, float]
 
@@ -91,12 +93,16 @@ class _Factors:
         return _Factors([np.where(np.abs(part) > least * largest, part, 0.0) for part in self.parts])
 
 
-def _factors(data: ConicData, z: np.ndarray, share: float) -> _Factors:
-    """Return factors of triangles z, (M,), without what is below a share of the largest eigenvalue."""
+def _factors(data: ConicData, z: np.ndarray, share: float, least: float) -> _Factors:
+    """Return factors of triangles z, (M,), without what is below a share of the largest eigenvalue.
+
+    Parts of a matrix whose coupling is below `least` times `_COUPLED` are factored apart: like eigenvalues would mix
+    their vectors, and what the data keep apart would be zero to rounding only.
+    """
     values, vectors, largest = [], [], 0.0
     for block in data.blocks:
         if block.kind is Kind.SEMIDEFINITE:
-            found, basis = np.linalg.eigh(from_triangle(z[block.rows], block.size))
+            found, basis = _eigenvectors(from_triangle(z[block.rows], block.size), _COUPLED * least)
         else:
             found, basis = z[block.rows], np.zeros(0)
         values.append(found)
@@ -113,6 +119,17 @@ def _factors(data: ConicData, z: np.ndarray, share: float) -> _Factors:
         else:
             parts.append(np.sqrt(np.where(kept, found, 0.0)))
     return _Factors(parts)
+
+
+def _eigenvectors(Z: np.ndarray, least: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return eigenvalues, in any order, and eigenvectors, part by part of what couples more than `least`."""
+    size = np.sqrt(np.maximum(np.diag(Z), 0.0))
+    count, part = connected_components(np.abs(Z) > least * np.outer(size, size), directed=False)
+    values, vectors = np.zeros(len(Z)), np.zeros_like(Z)
+    for k in range(count):
+        here = np.flatnonzero(part == k)
+        values[here], vectors[np.ix_(here, here)] = np.linalg.eigh(Z[np.ix_(here, here)])
+    return values, vectors
 
 
 def _multipliers(data: ConicData, factors: _Factors) -> np.ndarray:
@@ -157,10 +174,13 @@ def _columns(data: ConicData, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def promising(scaled: Scaled, dual: np.ndarray) -> bool:
-    """Return whether scaled multipliers exclude, as they are, all points of natural size."""
+    """Return whether scaled multipliers exclude, as they are, all points up to 1e4 times their natural size.
+
+    Those of a point exclude what costs less than it: far fewer.
+    """
     if np.shape(dual) != np.shape(scaled.right) or not np.all(np.isfinite(dual)):
         return False
-    return bool(-float(scaled.right @ dual) > 10 * float(np.max(np.abs(scaled.matrix.T @ dual), initial=0.0)))
+    return bool(-float(scaled.right @ dual) > 1e4 * float(np.max(np.abs(scaled.matrix.T @ dual), initial=0.0)))
 
 
 def prove_infeasible(scaled: Scaled, dual: np.ndarray, within: Reach | None = None) -> Infeasibility | None:
@@ -177,7 +197,7 @@ def prove_infeasible(scaled: Scaled, dual: np.ndarray, within: Reach | None = No
     dense = np.asarray((scaled.matrix.multiply(data.weight[:, None])).T.todense())  # acts on triangles without weights
     best: tuple[tuple[bool, float], Infeasibility] | None = None
     for share, least in ((share, least) for share in _FACES for least in _ZEROS):
-        factors = _factors(data, start, share).without(least)
+        factors = _factors(data, start, share, least).without(least)
         free = np.concatenate([part.ravel() for part in factors.parts]) != 0
         last, idle = np.inf, 0
         for _ in range(_STEPS):

@@ -142,8 +142,10 @@ def _middle(
     design = design + sp.csr_matrix((twice, (number, second[places])), shape=(height, width))
     design = design + sp.csr_matrix((np.ones(len(row)), (number[: len(row)], corners + column)), shape=(height, width))
     wanted = -np.log(np.concatenate([size[some], offset[still]]))
-    gram = (design.T @ design).toarray() + 1e-9 * np.eye(width)
-    found = np.exp(np.clip(np.linalg.solve(gram, design.T @ wanted), -300.0, 300.0))
+    used = np.flatnonzero(np.diff(design.tocsc().indptr))
+    design, found = sp.csr_matrix(design.tocsc()[:, used]), np.ones(width)
+    gram = (design.T @ design).toarray() + 1e-9 * np.eye(len(used))
+    found[used] = np.exp(np.clip(np.linalg.solve(gram, design.T @ wanted), -300.0, 300.0))
     return found[:corners], found[corners:]
 
 

@@ -158,14 +158,3 @@ def test_the_smallest_gamma_lies_where_it_is_said_to(seed):
     dual = observer(A.T, B.T, C.T, D.T, E.T)  # the same numbers: the dual plant
     assert dual.status is GainStatus.CERTIFIED, dual.sentence()
     assert dual.promised == pytest.approx(found.promised, rel=0.005)
-
-
-@pytest.mark.slow
-def test_twenty_states_take_seconds():
-    rng, n = np.random.default_rng(0), 20
-    A, B, E = rng.normal(size=(n, n)) / np.sqrt(n), rng.normal(size=(n, 2)), rng.normal(size=(n, 2))
-    C, D = np.vstack([np.eye(n), np.zeros((2, n))]), np.vstack([np.zeros((n, 2)), np.eye(2)])
-    found = state_feedback(A, B, E, C, D)
-    assert found.status is GainStatus.CERTIFIED, found.sentence()
-    assert found.smallest is not None
-    assert found.smallest[1] <= 1.005 * found.smallest[0]

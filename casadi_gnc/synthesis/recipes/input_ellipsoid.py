@@ -12,7 +12,8 @@ Every vertex v lies in the ellipsoid, the ellipsoid shrinks, and in it |u_i| <= 
     [1, v'; v, X] >= 0,   A X + X A' - B W - W'B' + 2 a X < 0,   [s^2 limit_i^2, W_i; W_i', X] >= 0
 
 with W all at once, and s^2 limit^2 I, for a limit on the Euclidean norm. s is minimised and s <= 1
-(S. Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, section 7.2.3). The
+(S. Boyd et al., Linear Matrix Inequalities in System and Control Theory, 1994, section 7.2.3). Where there are many
+vertices they share one matrix: v'Y v <= 1 and [Y, I; I, X] >= 0, that is Y >= X^-1, say the same. The
 vertices are used themselves; a bound on 1'P1 instead would be wrong (an erratum of Shi et al. 2020).
 """
 
@@ -20,6 +21,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from casadi_gnc.errors import SynthesisError
@@ -27,6 +29,8 @@ from casadi_gnc.synthesis.analysis import fits, matrices
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.unknowns import block_matrix
+
+_APART = 4  # vertices up to which each has a matrix of its own
 
 
 def input_ellipsoid(
@@ -76,8 +80,7 @@ def input_ellipsoid(
     lmis = Lmis()
     X, W, share = lmis.symmetric("X", n), lmis.rectangular("W", m, n), lmis.scalar("share")
     moved = A @ X - B @ W
-    for k, vertex in enumerate(vertices):
-        lmis.psd(block_matrix([[1, vertex[None]], [X]]), margin=margin, name=f"start {k} in the ellipsoid")
+    _enclose(lmis, X, vertices, margin)
     lmis.nsd(moved + moved.T + 2 * decay_1_s * X, margin=margin, name="decay")
     if per_channel:
         for i in range(m):
@@ -100,3 +103,21 @@ def input_ellipsoid(
         parts=(A, -B @ K),
         missing="Ask for a smaller decay_1_s.",
     )
+
+
+def _enclose(lmis: Lmis, X: ca.SX, vertices: np.ndarray, margin: float) -> None:
+    """Ask that v'X^-1 v <= 1 for every vertex; -v says the same as v."""
+    seen: dict[tuple[float, ...], int] = {}
+    for k, vertex in enumerate(vertices):
+        first = vertex[np.flatnonzero(vertex)[:1]]
+        seen.setdefault(tuple((vertex * np.sign(first) if len(first) else vertex) + 0.0), k)
+    if len(seen) <= _APART:
+        for k in seen.values():
+            lmis.psd(block_matrix([[1, vertices[k][None]], [X]]), margin=margin, name=f"start {k} in the ellipsoid")
+        return
+    n = vertices.shape[1]
+    Y = lmis.symmetric("Y", n)
+    lmis.psd(block_matrix([[Y, np.eye(n)], [X]]), margin=margin, name="Y above the inverse of X")
+    for k in seen.values():
+        vertex = vertices[k]
+        lmis.nonnegative(1 - vertex[None] @ Y @ vertex[:, None], margin=margin, name=f"start {k} in the ellipsoid")

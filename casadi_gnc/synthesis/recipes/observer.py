@@ -121,4 +121,4 @@ def observer(
             missing=missing if noisy < r else "Give fastest_rad_s.",
         )
 
-    return two_steps(pose, gains_of, gamma, slack, margin, backend, options)
+    return two_steps(pose, gains_of, gamma, slack, margin, backend, options, attained=noisy == r)

@@ -133,4 +133,4 @@ def state_feedback(
             missing=missing if priced < m else "Give fastest_rad_s.",
         )
 
-    return two_steps(pose, gains_of, gamma, slack, margin, backend, options)
+    return two_steps(pose, gains_of, gamma, slack, margin, backend, options, attained=priced == m)

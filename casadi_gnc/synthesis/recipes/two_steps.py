@@ -29,6 +29,7 @@ def two_steps(
     margin: float,
     backend: Any,
     options: dict[str, Any],
+    attained: bool,
 ) -> Synthesis:
     """Return the gains of the second step, or of the first if only that succeeds.
 
@@ -41,6 +42,7 @@ def two_steps(
     slack : positive.
     margin : the first to be tried, and the largest; positive.
     backend, options : of `Lmis.solve`.
+    attained : whether above the smallest gamma there is a largest solution, with finite gains: all commands are priced.
     """
     if not (np.isfinite(slack) and slack > 0) or (gamma is not None and not (np.isfinite(gamma) and gamma > 0)):
         raise SynthesisError(f"gamma is {gamma} and slack {slack}; expected positive numbers")
@@ -74,6 +76,8 @@ def two_steps(
     second = replace(second, smallest=between)
     if first is None or second.is_certified:
         return second
-    if first.is_certified and first.lmis.far:  # nor is there a largest solution a little above it
+    if first.is_certified and first.lmis.far and not attained:  # nor is there a largest solution a little above it
         return replace(first, status=GainStatus.RUNS_AWAY)
-    return first if first.is_certified or not second.lmis.status.holds else second
+    if first.is_certified or not (attained or second.lmis.status.holds):
+        return first
+    return second
