@@ -105,7 +105,11 @@ COMMANDS = (
         synthesize.synthesize,
         GAINS,
         "Gains from matrix inequalities, certified from the data.",
-        ("synthesize shi2020/synthesis", "synthesize gains.toml --backend clarabel --json"),
+        (
+            "synthesize shi2020/synthesis",
+            "synthesize gains.toml --backend clarabel --json",
+            "synthesize gains.toml --into mission.toml --scheme pd",
+        ),
     ),
     Entry(
         generate.generate,

@@ -131,3 +131,53 @@ def test_a_flat_cost_and_a_target_that_cannot_be_are_told(mission):
         gnc.tune(mission, ["rate_gain"], out=mission)
     with pytest.raises(GncError, match=r"expected a name that ends in \.toml"):
         gnc.tune(mission, ["rate_gain"], out=mission.with_suffix(".txt"))
+
+
+LAW = '''
+from dataclasses import dataclass
+from typing import Any
+
+import casadi_gnc as gnc
+from casadi_gnc.checks import sufficient
+
+
+@dataclass(frozen=True, eq=False)
+class Turn(gnc.Law):
+    """Turn the MRPs to zero."""
+
+    stiffness: Any = gnc.gain("N m", "torque per MRP", above=0.0)
+    damping: Any = gnc.gain("N m s/rad", "torque per rate", above=0.0)
+
+    effort = gnc.TORQUE
+    inputs = gnc.Layout((gnc.Signal("mrp", 3, "-"), gnc.Signal("rate", 3, "rad/s")))
+
+    def checks(self):
+        yield sufficient("gains.damped", self.damping, 9.0 * self.stiffness**0.5, "N m s", "mine")
+
+    def command(self, t, y, m):
+        now = self.inputs.split(y)
+        return -self.stiffness * now.mrp - self.damping * now.rate
+'''
+
+
+def test_a_guests_law_against_a_campaign_keeps_its_own_condition(mission):
+    """The mean that is promised is that of the campaign of the same plan and seed; the condition stops the descent."""
+    mission.with_name("turn.py").write_text(LAW)
+    mine, out = mission.with_name("mine.toml"), mission.with_name("mine_tuned.toml")
+    own = {'"attitude_pd"': '"./turn.py:Turn"', "attitude_gain": "stiffness", "rate_gain": "damping"}
+    text = mission.read_text()
+    for theirs, name in own.items():
+        text = text.replace(theirs, name)
+    mine.write_text(text)
+    options = {"cost": "integral(mrp)", "iterations": 5, "threads": 1}
+    found = gnc.tune(mine, ["stiffness", "damping"], against="campaign", cases=8, seed=3, out=out, **options)
+    assert found.ratio > 2
+    law = load(out).scheme().law
+    (check,) = law.checks()
+    assert check.holds
+    assert check.margin < 0.02 * check.limit
+    written = load(out)
+    attitude = gnc.Metric("attitude", "mean", "mrp", norm="two")
+    flown = gnc.campaign(dataclasses.replace(written, metrics=[*written.metrics, attitude]), 8, plan="sobol", seed=3)
+    mean = float(np.mean(flown.column("metric.attitude"))) * 40.0
+    assert found.cost_after == pytest.approx(mean / found.terms[0].before, rel=1e-9)

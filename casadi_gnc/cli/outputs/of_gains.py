@@ -122,6 +122,15 @@ class Peak(TypedDict):
 
 
 @_TOLD
+class Written(TypedDict):
+    """Gains that were written into a mission file."""
+
+    file: str
+    keys: list[str]
+    checks: dict[str, str]
+    """What then warns or fails."""
+
+
 class Synthesis(TypedDict):
     """Gains and their certificate; keys that a recipe does not have are left out."""
 
@@ -145,3 +154,4 @@ class Synthesis(TypedDict):
     peak: NotRequired[Peak | None]
     stable_ratios: NotRequired[list[float | None] | None]
     """Range of (assumed mass)/(true mass); null: without an end."""
+    written: NotRequired[Written]

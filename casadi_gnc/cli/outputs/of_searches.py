@@ -139,7 +139,7 @@ class Tuning(TypedDict):
     requirements: list[Number]
     """Robustness of each."""
     worse: list[str]
-    """Metrics and requirements that moved the wrong way."""
+    """Requirements that moved the wrong way, at nominal or in the worst case."""
     course: list[list[float | str | None]]
     """The cost of each iterate, and how it was found."""
     flights: int
