@@ -39,6 +39,8 @@ def _told(error: Exception) -> str:
     text = str(error).strip()
     if "truth value" in text:
         return _ON_SYMBOLS + guests.own_lines(error)
+    if isinstance(error, OverflowError):
+        return "a number overflows in it, one of its data is too large" + guests.own_lines(error)
     if not isinstance(error, (RuntimeError, NotImplementedError)) or "\n" not in text:
         return guests.told(error)
     lines = [line.strip() for line in text.splitlines() if line.strip()]

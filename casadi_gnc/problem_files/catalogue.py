@@ -9,7 +9,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, get_args, get_origin
 
-from casadi_gnc.errors import GncError
+from casadi_gnc.errors import GncError, ProblemError
 from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.laws import Law, gains_of
 from casadi_gnc.missions import fitting
@@ -55,7 +55,10 @@ def laws(problem: str | Path | None = None) -> list[Named]:
     for table in document.data.get("scheme", []):
         name = table.get("law", {}).get("type") if isinstance(table, dict) else None
         if isinstance(name, str) and name not in [one.name for one in found]:
-            found.append(Named(name, LAWS.find(name, document.folder)))
+            try:
+                found.append(Named(name, LAWS.find(name, document.folder)))
+            except GncError as error:
+                raise ProblemError(str(error), document.path.name) from error
     return found
 
 

@@ -1,12 +1,16 @@
 """The pages made from the code hold what the code has."""
 
+import re
 import sys
 
+import pytest
 from running_pages import ROOT
 
+from casadi_gnc.errors import ProblemError
 from casadi_gnc.laws import REGISTRY as LAWS
 from casadi_gnc.missions.craft import REGISTRY as CRAFTS
 from casadi_gnc.problem_files import catalogue
+from casadi_gnc.problem_files.document import read
 from casadi_gnc.status import StepStatus
 
 
@@ -39,3 +43,10 @@ def test_a_law_fits_a_craft_as_in_the_example_that_measures_what_it_reads():
     assert found["fits_as"] == {"satellite": "satellites/detumble_bdot"}
     (plain,) = [law for law in catalogue.laws() if law.name == "mrp_feedback"]
     assert not catalogue.law_data(plain, {"satellite": catalogue.sample_of(satellite)})["fits_as"]
+
+
+def test_a_law_that_is_not_there_names_the_file(tmp_path):
+    text = read("huang2020/slew").text
+    (tmp_path / "mine.toml").write_text(re.sub(r'^type = ".*"', 'type = "nobodys"', text, count=1, flags=re.MULTILINE))
+    with pytest.raises(ProblemError, match=r"^mine\.toml: no law 'nobodys'; "):
+        catalogue.laws(tmp_path / "mine.toml")

@@ -10,6 +10,7 @@ import pytest
 import casadi_gnc as gnc
 from casadi_gnc.embedded import boards
 from casadi_gnc.errors import AllocationError, FlightError, LawError, TargetError
+from casadi_gnc.missions.asking import ask
 from casadi_gnc.missions.checks import REGISTRY as CHECKS
 from casadi_gnc.problem_files.synthesis_checks import check as check_synthesis
 from casadi_gnc.reports import flight_pictures
@@ -201,3 +202,12 @@ def test_a_certified_recipe_without_gains_does_not_fail(tmp_path):
         ("synthesis.lmi.size", "ok"),
         ("synthesis.lmi.decay", "ok"),
     ]
+
+
+def test_a_number_that_overflows_is_told_without_words_of_python():
+    class Owner:
+        def rate(self):
+            return 1e200**2
+
+    with pytest.raises(LawError, match=r"Owner\.rate failed: a number overflows in it, one of its data is too large"):
+        ask(Owner(), "rate")

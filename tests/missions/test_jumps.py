@@ -4,13 +4,16 @@ import itertools
 from dataclasses import dataclass, replace
 
 import casadi as ca
+import fmpy
 import numpy as np
 import pytest
+from fmpy.fmi2 import FMU2Slave
 from scipy.integrate import solve_ivp
 
 import casadi_gnc as gnc
 from casadi_gnc.campaigns.engines import CompiledBatch, best_vectors
 from casadi_gnc.checking import sampling
+from casadi_gnc.delivery.vectors import CompiledPlant
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.one_build import fly_case
@@ -110,6 +113,38 @@ def test_engines_agree_on_every_jump(mode):
             found = loop(t=0.1 * k, **at)
             at = {name: found[f"{name}_next"] for name in at}
         assert float(at["x"]) == pytest.approx(machine["level"][-1], rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("period", [0.1, 0.15], ids=["jumps at samples", "and inside steps"])
+def test_what_steps_on_board_has_the_words_of_the_flight_across_jumps(period, tmp_path):
+    """The controller by hand and as a unit in another tool, fed with what the flight measured; the law itself jumps."""
+    mission = tank("sampled", period)
+    flight = gnc.fly(mission, decimation=1)
+    controller, plant = mission.controller(), CompiledPlant(mission, mission.scheme())
+    path = gnc.generate_fmu(mission, tmp_path / "tank.fmu", name="tank")
+    about = fmpy.read_model_description(str(path))
+    places = {one.name: one.valueReference for one in about.modelVariables}
+    unit = FMU2Slave(
+        guid=about.guid, unzipDirectory=fmpy.extract(str(path), str(tmp_path / "unit")), modelIdentifier="tank",
+        instanceName="one",
+    )  # fmt: skip
+    unit.instantiate()
+    unit.setupExperiment(startTime=0.0)
+    unit.enterInitializationMode()
+    unit.exitInitializationMode()
+    commands = []
+    for k in range(round(4.0 / period)):
+        t, level = plant.measure(k)
+        pump = controller.step(t, level=level)["pump"]
+        unit.setReal([places["level"]], [level])
+        unit.doStep(currentCommunicationPoint=k * period, communicationStepSize=period)
+        assert pump == unit.getReal([places["pump"]])[0] == flight["pump"][k], (k, t)
+        plant.advance(k, np.atleast_1d(pump))
+        commands.append(pump)
+    assert np.abs(np.diff(commands)).max() > 1.0  # the jump at 2 s is among them
+    unit.terminate()
+    unit.freeInstance()
 
 
 # The shipped ones that jump.
