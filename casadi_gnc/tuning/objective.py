@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,13 @@ from casadi_gnc.embedded.printer import Math
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.requirements import Requirement
+from casadi_gnc.missions.sensitivities import Sensitivities
 from casadi_gnc.tuning.space import Space
 
 #: Step of differences, in standard units.
 STEP = 1e-3
+#: Step of differences of the numbers by the coordinates, which are smooth.
+_TURN = 1e-5
 
 
 class Objective:
@@ -123,6 +127,40 @@ class Objective:
         step : in standard units.
         """
         return differences(self.space, self.values, point, step)
+
+    @cached_property
+    def sensitivities(self) -> Sensitivities:
+        """Flights with derivatives of the same number, built when first asked for."""
+        return Sensitivities(self.cases.varied, self.column.partition(".")[2])
+
+    def derivatives(self, point: Any, temperature: float = 0.0) -> tuple[float, np.ndarray]:
+        """Return the number at a point, or its smooth companion, and its slope, (p,), from one flight there and back.
+
+        The slope is that of the flight as it decided (`casadi_gnc.missions.sensitivities`), 0 of choices and of
+        coordinates that are NaN, and costs a few flights whatever p; NaN where the flight has no number.
+
+        Parameters
+        ----------
+        point : (p,), in standard units.
+        temperature : of the companion, unit of the number.
+
+        Raises
+        ------
+        GncError
+            For a scheme or a number without derivatives, as `casadi_gnc.sensitivities`.
+        """
+        point = np.asarray(point, dtype=float)
+        (row,) = self.space.rows(point[None, :])
+        found = self.sensitivities.at_row(row, temperature=temperature, seed=self.seed)
+        moved = np.flatnonzero(~(self.space.discrete | np.isnan(point)))
+        slope = np.zeros(self.size)
+        for i in moved:  # of the numbers by the coordinate: most laws are linear in it, the others smooth
+            ends = np.tile(point, (2, 1))
+            ends[0, i] = min(point[i] + _TURN, self.space.high[i])
+            ends[1, i] = max(point[i] - _TURN, self.space.low[i])
+            ahead, behind = self.space.rows(ends)
+            slope[i] = found.gradient @ (ahead - behind) / (ends[0, i] - ends[1, i])
+        return found.value, slope
 
     def _told(self, table: Columns) -> np.ndarray:
         found = np.asarray(table[self.column], dtype=float)

@@ -7,8 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from casadi_gnc.campaigns import Choice, Correlated, LogUniform, Normal, Uniform
-from casadi_gnc.tuning import Space
+import casadi_gnc
+from casadi_gnc.campaigns import Choice, Correlated, DispersionTable, LogUniform, Normal, Uniform
+from casadi_gnc.missions.requirements import Requirement
+from casadi_gnc.tuning import Objective, Space
 
 KEYS = ("n", "u.1", "u.2", "l", "c", "k.1", "k.2")
 GIVEN = ("n", "u", "l", "c", "k")
@@ -61,3 +63,25 @@ def test_an_alternative_that_is_never_drawn_is_none():
     points = np.full((2, 7), math.nan)
     points[:, 4] = found
     assert there.rows(points)[:, 4].tolist() == [1.0, 7.0]
+
+
+@pytest.mark.slow
+def test_derivatives_are_what_differences_come_to():
+    """A flight there and back against differences of flights, one coordinate left out and one at its end."""
+    mission = casadi_gnc.load("huang2020/detumble").with_timing(duration=60.0)
+    ends = [0.9, 1.1]
+    varying = [
+        DispersionTable(key="initial.rate_rad_per_s", normal={"mean": 0.4, "deviation": 0.05}),
+        DispersionTable(key="truth.inertia_factor", uniform=ends),
+        DispersionTable(key="scheme.observer_pinv.law.rate_gain", log_uniform=[0.1, 2.0]),
+    ]
+    asked = Requirement("SLOW", formula="eventually[50, 60](norm(rate) <= 0.05)")
+    objective = Objective(mission, "observer_pinv", parameters=varying, what=asked)
+    point = np.array([0.2, -0.5, math.nan, 1.0, 0.3])
+    value, slope = objective.derivatives(point)
+    assert value == pytest.approx(objective.values(point[None, :])[0], rel=1e-12)
+    assert slope[2] == 0
+    # Thrusters clip often in this flight: a step of 1e-3 meets decisions that turn.
+    assert slope == pytest.approx(objective.gradient(point, 1e-6), rel=1e-4, abs=1e-7)
+    soft, _ = objective.derivatives(point, temperature=1e-3)
+    assert 0 <= soft - value <= 1e-3 * math.log(1e4)
