@@ -38,9 +38,16 @@ class Effort:
     sampled: int = 0
 
 
-def descend(
-    flights: Flights, reach: Reach, start: Trial, scale: float, seed: int, effort: Effort, steps: int = _MOST
-) -> Trial:
+def probe(flights: Flights, reach: Reach, start: Trial) -> Trial:
+    """Return the lower of a flight and that where its linearised number is least: a slope, and one flight."""
+    slope = _slope(flights, start, None)
+    if slope is None:
+        return start
+    found = flights.best(start.of, reach.lowest(slope, start.point)[None, :])
+    return flights.note("descent", found) if found.value < start.value else start
+
+
+def descend(flights: Flights, reach: Reach, start: Trial, scale: float, seed: int, effort: Effort) -> Trial:
     """Return the lowest flight that a descent finds; it ends at the first that breaks the requirement.
 
     Parameters
@@ -51,12 +58,11 @@ def descend(
     scale : size of the number, such as that at the nominal.
     seed : of the points around, where slopes lead nowhere.
     effort : what is counted.
-    steps : at most.
     """
     effort.descents += 1
     now, size = start, reach.space.size
     inverse, before = np.eye(size), None
-    for number in range(steps):
+    for number in range(_MOST):
         if now.broken:
             return now
         slope = _slope(flights, now, None if before is None else before[1])

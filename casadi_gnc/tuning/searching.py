@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from casadi_gnc.campaigns.plans import Sobol
-from casadi_gnc.tuning.descending import Effort, descend
+from casadi_gnc.tuning.descending import Effort, descend, probe
 from casadi_gnc.tuning.flights import Flights, SpentError, Trial
 from casadi_gnc.tuning.reach import Reach
 from casadi_gnc.tuning.space import Space
@@ -109,7 +109,7 @@ def _downhill(
     starts = [known[0], *sorted(known[1:], key=lambda each: each.value)][:_BRANCHES]
     lower = []
     for start in starts:
-        lower.append(descend(flights, reach, _moved(flights, start), scale, seed, effort, steps=1))
+        lower.append(probe(flights, reach, _moved(flights, start)))
         if lower[-1].broken:
             return lower[-1]
     ends = _ends(flights.space, reach)
