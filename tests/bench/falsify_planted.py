@@ -28,7 +28,7 @@ from casadi_gnc.tuning.reach import Reach
 from casadi_gnc.tuning.searching import search
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tuning"))
-from planted import PLANTED, Planted
+from planted import PLANTED
 
 
 def fresh(builds, most):
