@@ -51,7 +51,9 @@ def package(name: str, real: str, folder) -> tuple[Mekf, np.ndarray]:
 def test_single_precision_survives(name, tmp_path):
     """The difference of the two estimates over the filter's own deviations, from the tenth second on.
 
-    A unit quaternion in single precision has steps of 6e-8, of attitudes that are known to 2e-5 rad 3e-3 of a sigma.
+    A unit quaternion in single precision has steps of 6e-8: of attitudes that are known to 2e-5 rad 3e-3 of a sigma. In
+    the flight of all sensors, rounding the double filter's attitude alone from sample to sample gives 0.011, its bias
+    alone 0.0009, its measurements alone 0.0005, its answer alone 0.0023.
     The bounds are about twice what this flight shows, 0.038 and 0.0023.
     """
     _, double = package(name, "float64", tmp_path / "double")
