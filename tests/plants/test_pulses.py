@@ -10,9 +10,11 @@ from pydantic import ValidationError
 
 import casadi_gnc
 from casadi_gnc.allocation.pulses import Pulse, PulseModulation
+from casadi_gnc.campaigns.engines import CompiledBatch, best_vectors
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.mechanics.firing import STANDARD_GRAVITY, FiringThrusters
+from casadi_gnc.missions.parameters import vary
 from casadi_gnc.vehicles.satellite import part_tables, pointing_checks
 from casadi_gnc.vehicles.satellite.part_tables import ThrusterTable
 
@@ -151,3 +153,16 @@ def test_the_limit_cycle_that_is_checked_bounds_the_flown_one(least_on):
     late = casadi_gnc.fly(mission, decimation=1)["mrp"][1500:]
     swing = 4 * np.degrees(np.linalg.norm(late - late.mean(axis=0), axis=1).max())
     assert 0.05 * check.value < swing <= check.value
+
+
+@pytest.mark.slow
+def test_pulses_have_the_same_words_in_vector_lanes():
+    """Flights side by side, each with pulses of its own."""
+    mission = casadi_gnc.load(PULSES, changes={**PINV, "timing.duration_s": 60.0})
+    varied = vary(mission, ["thruster.1.pulse.quantum_s", "thruster.2.pulse.least_on_s"])
+    values = np.array([[0.005, 0.02], [0.003, 0.01], [0.02, 0.05], [0.007, 0.03], [0.005, 0.02]])
+    seeds = np.full(len(values), 7, dtype=np.uint64)
+    lanes = CompiledBatch(varied, vectors=best_vectors(), threads=1).fly(values, seeds)
+    alone = CompiledBatch(varied, vectors="none", threads=1).fly(values, seeds)
+    assert (lanes.words == alone.words).all()
+    assert len(np.unique(lanes.words, axis=0)) == 4
