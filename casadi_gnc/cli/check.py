@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -84,6 +85,21 @@ def _print_json(title: str, found: list[Check]) -> None:
     typer.echo(encoder.dumps({"problem": title, "checks": as_data(found)}, indent=2, allow_nan=False))
 
 
+def _sections(found: list[Check]) -> list[tuple[str, list[Check]]]:
+    """Return checks under their schemes; what says the same of every scheme comes first, once."""
+    by_scheme = {name: list(group) for name, group in itertools.groupby(found, key=lambda one: one.scheme)}
+    flown = [name for name in by_scheme if name]
+    if len(flown) < 2:
+        return list(by_scheme.items())
+    bare = [{replace(one, scheme="") for one in by_scheme[name]} for name in flown]
+    shared = set.intersection(*bare)
+    first = [one for one in by_scheme[flown[0]] if replace(one, scheme="") in shared]
+    made = [("", by_scheme[""])] if "" in by_scheme else []
+    made += [(f"all {len(flown)} schemes", first)] if first else []
+    rest = {name: [one for one in by_scheme[name] if replace(one, scheme="") not in shared] for name in flown}
+    return made + [(name, checks) for name, checks in rest.items() if checks]
+
+
 def _print(title: str, found: list[Check], plot: Path | None) -> None:
     from rich.console import Console
     from rich.markup import escape
@@ -93,7 +109,7 @@ def _print(title: str, found: list[Check], plot: Path | None) -> None:
     for name, justify in (("check", "left"), ("value", "right"), ("limit", "left"), ("", "left")):
         table.add_column(name, justify=justify, no_wrap=True)  # type: ignore[arg-type]
     colours = {"ok": "green", "note": "cyan", "warn": "yellow", "fail": "red"}
-    for scheme, group in itertools.groupby(found, key=lambda one: one.scheme):
+    for scheme, group in _sections(found):
         if scheme:
             table.add_section()
             table.add_row(f"[bold]{escape(scheme)}[/]")
@@ -101,7 +117,7 @@ def _print(title: str, found: list[Check], plot: Path | None) -> None:
             unit = "" if one.unit == "-" else f" {one.unit}"
             sense = (">" if one.strict else ">=") if one.at_least else ("<" if one.strict else "<=")
             limit = f"{sense} {one.limit:.4g}{unit}"
-            table.add_row(one.name, f"{one.value:.4g}", limit, f"[{colours[one.verdict]}]{one.verdict}[/]")
+            table.add_row(one.name, f"{one.value:.4g}{unit}", limit, f"[{colours[one.verdict]}]{one.verdict}[/]")
     # Nothing is cut, however narrow the terminal: a line that is too long runs on.
     console = Console(soft_wrap=True)
     console.width = max(console.width, Console(width=1000).measure(table).maximum)

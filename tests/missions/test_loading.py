@@ -40,7 +40,7 @@ CASES = {
     "unknown law": (GOOD, 'type = "rate_damping"', 'type = "magic"', r"line LINE, scheme\[1\].law.type: no law 'magic'; there is rate_damping"),
     "negative gain": (GOOD, "rate_gain = 0.4 }", "rate_gain = -0.4 }", r"scheme\[1\].law.rate_gain: is -0.4, expected a number > 0"),
     "unknown erratum": (GOOD, 'feedback = "wanted"', 'feedback = "wanted"\nas_printed = ["typo"]', "detumble has no erratum 'typo'; known: anti_windup_sign"),
-    "unknown signal": (GOOD, 'signal = "force"', 'signal = "forces"', r"metric\[4\].signal: 'forces' of the metric 'force_sample_sum' is no signal of scheme damping_pinv; there is time, mrp"),
+    "unknown signal": (GOOD, 'signal = "force"', 'signal = "forces"', r"metric\[4\].signal: 'forces' of the metric 'force_sample_sum' is no signal of scheme damping_pinv; did you mean 'force'\? There is time, mrp"),
     "same name": (GOOD, 'name = "observer_pinv"', 'name = "damping_pinv"', "the name 'damping_pinv' is given twice"),
     "name for a shell": (GOOD, 'name = "observer_pinv"', 'name = "a; rm -rf b"', r"scheme\[2\].name: is 'a; rm -rf b', expected a name of letters, digits and _"),
     "start outside funnel": (SLEW, "start = [0.40, 0.35, 0.15]", "start = [0.10, 0.35, 0.15]", "axis 1 starts at -0.206, outside its funnel from -0.1 to 0.01"),

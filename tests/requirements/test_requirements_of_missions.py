@@ -67,7 +67,7 @@ def test_what_is_required_is_part_of_the_digest_of_objects(detumble):
 
 WRONG = {
     'id = "A"\nmetric = "setling_time"\nat_most = 1': (
-        "requirement[1].metric: A bounds 'setling_time', which is no metric; did you mean settling_time?"
+        "requirement[1].metric: A bounds 'setling_time', which is no metric; did you mean 'settling_time'? There is settling_time"
     ),
     'id = "A"': "requirement[1]: A has neither: a metric with at_most or at_least, or a formula",
     'id = "A"\nmetric = "settling_time"\nformula = "always(time >= 0)"': "requirement[1]: A has both; keep one of them",
@@ -189,7 +189,7 @@ def test_margins_of_a_table_of_cases():
         0,
         math.inf,
     ]
-    with pytest.raises(RequirementError, match="A bounds m, and there is other"):
+    with pytest.raises(RequirementError, match="A bounds 'm', which is no metric; there is other"):
         asked.margins({"other": [1.0]})
 
 
