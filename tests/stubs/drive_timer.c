@@ -10,7 +10,7 @@ void sat_tick(void);
 int32_t sat_poll(void);
 uint32_t sat_missed(void);
 
-static long k, wrong;
+static long k, shifted, wrong;
 
 void sat_take(sat_input *input) { replay_load(k, input); }
 
@@ -19,6 +19,8 @@ void sat_give(const sat_output *output)
     replay_word found[REPLAY_OUTPUTS];
     int i;
     replay_store(output, found);
+    shifted += (found[REPLAY_OUTPUTS - 1] & SAT_TIME_SHIFTED) != 0; /* after a period that was missed */
+    found[REPLAY_OUTPUTS - 1] &= ~(replay_word)SAT_TIME_SHIFTED;
     for (i = 0; i < REPLAY_OUTPUTS; i++) wrong += found[i] != replay_outputs[k][i];
     k++;
 }
@@ -32,6 +34,6 @@ int main(void)
         sat_tick();
         if (sat_poll() != 1 || sat_poll() != 0) return 3;
     }
-    (void)printf("%ld steps, %ld words differ, %u missed\n", k, wrong, (unsigned)sat_missed());
+    (void)printf("%ld steps, %ld words differ, %u missed, told %ld times\n", k, wrong, (unsigned)sat_missed(), shifted);
     return 0;
 }
