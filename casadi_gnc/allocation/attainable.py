@@ -72,7 +72,8 @@ def attainable(
     Parameters
     ----------
     wanted : (R,) or one number, half-widths of a virtual-control box [effort]; its proportions are those of
-        the largest box. Left out: a cube.
+        the largest box. Left out: a cube, of rows of several kinds one cube a kind, in proportion to the
+        least reach along an axis of the nominal geometry: no length is both a force and a torque.
     directions : (K, R), for the margins; left out: the R axes.
     samples : how many points inside the uncertainty to try; mixtures of its vertices with
         Dirichlet weights, half of them crowded towards faces and edges.
@@ -101,9 +102,9 @@ the largest box of its proportions is 50 % of it')
     if len(told) != rows:
         raise AllocationError(f"units has {len(told)} entries, expected {rows}, one a row")
     box = None if wanted is None else half_widths(wanted, rows)
-    shape = np.ones(rows) if box is None else box
     along = np.eye(rows) if directions is None else np.atleast_2d(real_array("directions", directions, AllocationError))
     sets = attainable_sets(problem, previous=previous)
+    shape = _cubes(sets[0], told) if box is None else box
     notes: list[str] = []
     nominal, vertices, common = (_reach(one, shape, along, told, notes) for one in sets)
     drawn = samples if problem.is_robust and not any(np.isnan(each) for each in nominal.spheres.values()) else 0
@@ -115,6 +116,16 @@ the largest box of its proportions is 50 % of it')
         drawn = affordable
     inside = _sampled(problem, sets[1], shape, along, told, drawn, seed, previous) if drawn else None
     return Attainable(box, along, nominal, vertices, common, inside, drawn, seed, told, tuple(dict.fromkeys(notes)))
+
+
+def _cubes(one: AttainableSet, units: tuple[str, ...]) -> np.ndarray:
+    """Return the proportions of a box that is a cube in the rows of each kind, (R,)."""
+    if len(set(units)) == 1:
+        return np.ones(len(units))
+    axes = np.array([one.line(axis) for axis in np.eye(len(units))])
+    reach = np.nan_to_num(np.minimum(-axes[:, 0], axes[:, 1])).clip(0)
+    least = np.array([min(reach[row] for row, each in enumerate(units) if each == unit) for unit in units])
+    return least if least.any() else np.ones(len(units))
 
 
 def _reach(one: AttainableSet, shape: np.ndarray, along: np.ndarray, units: tuple[str, ...], notes: list[str]) -> Reach:

@@ -6,6 +6,7 @@ Only where that takes a moment: sampled missions whose allocation is an expressi
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -30,11 +31,20 @@ def path(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
     """Return times, (K,), and the plant's states at them, (K, n), of a mission that `can_fly`."""
     loop, start = functions.closed_loop_function(mission, scheme), functions.loop_start(mission, scheme)
     t, columns = ca.SX.sym("t"), {name: ca.SX.sym(name, start[name].numel()) for name in _COLUMNS}
-    later = loop(t=t, **columns)
+    moved = loop(t=t, **columns)
     state = ca.vertcat(*columns.values())
-    step = ca.Function("step", [state, t], [ca.vertcat(*(later[f"{name}_next"] for name in _COLUMNS))])
+    step = ca.Function("step", [state, t], [ca.vertcat(*(moved[f"{name}_next"] for name in _COLUMNS))])
     times = np.arange(mission.timing.samples) * mission.timing.sample_period
-    begun = np.array(ca.vertcat(*(start[name] for name in _COLUMNS)))
-    moved = np.array(step.mapaccum(len(times) - 1)(begun, times[None, :-1]))
-    rows = mission.truth.state.size
-    return times, np.vstack([begun[:rows].T, moved[:rows].T])
+    now, at = np.array(ca.vertcat(*(start[name] for name in _COLUMNS))).ravel(), np.zeros(1)
+    states, later = np.empty((len(times), mission.truth.state.size)), np.empty_like(now)
+    # In one piece of memory; CasADi's own chain of steps takes longer to build than to fly.
+    memory, run = step.buffer()
+    view: Any = memoryview
+    for place, column in enumerate((now, at)):
+        memory.set_arg(place, view(column))
+    memory.set_res(0, view(later))
+    for k, time in enumerate(times):
+        states[k], at[0] = now[: states.shape[1]], time
+        run()
+        now[:] = later
+    return times, states

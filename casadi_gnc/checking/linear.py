@@ -7,6 +7,7 @@ slope is that of plant and law together.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -129,7 +130,8 @@ class LinearLoop:
         times = np.arange(samples) * h
         closed, _ = _functions(mission, self.scheme)
         t = ca.SX.sym("t")
-        at_rest = ca.Function("at_rest", [t], [closed(t, ca.DM(x0), ca.DM(m0))])  # all but time is folded
+        folded = ca.cse(closed(t, ca.DM(x0), ca.DM(m0)))  # all but time is a number
+        at_rest = ca.Function("at_rest", [t], [folded])
         moved = np.array(at_rest.map(samples)(times + (0 if self.sampled else h / 2))).T
         size = self.matrix.shape[0]
         if self.sampled:
@@ -155,20 +157,37 @@ def driven_at_the_end(mission: Mission, scheme: Scheme, part: float) -> np.ndarr
 
 
 def driven(step: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """Return the states s_0 = 0, s_(k+1) = step s_k + push_k, (K, n), by doubling: a sum over 2, 4, 8 ... steps.
+    """Return the states s_0 = 0, s_(k+1) = step s_k + push_k, (K, n), as sqrt(K) paths that go on side by side.
+
+    Each path begins at 0; then what it begins with in truth, the end of the one before, is carried through it.
 
     Parameters
     ----------
     step : (n, n).
     push : (K, n); the last one moves no state that is returned.
     """
-    path = np.vstack([np.zeros((1, len(step))), push[:-1]])
-    reach, power = 1, step
-    while reach < len(path):
+    count, size = push.shape
+    length = math.isqrt(count) + 1
+    paths = -(-count // length)
+    padded = np.zeros((paths * length, size))
+    padded[1:count] = push[:-1]
+    path = np.ascontiguousarray(padded.reshape(paths, length, size).transpose(1, 0, 2))  # step, path, state
+    whole = np.eye(size)  # of the step, `length` times
+
+    def moved(states: np.ndarray) -> np.ndarray:
         # An unstable part grows beyond all numbers; what it does not touch goes on.
-        path[reach:] = np.clip(path[reach:] + path[:-reach] @ power.T, -_HUGE, _HUGE)
-        power, reach = np.clip(power @ power, -_HUGE, _HUGE), 2 * reach
-    return path
+        return np.clip(states @ step.T, -_HUGE, _HUGE)
+
+    for k in range(length):
+        path[k] += moved(path[k - 1]) if k else 0.0
+        whole = moved(whole)
+    begun = np.zeros((paths, size))
+    for i in range(1, paths):
+        begun[i] = np.clip(begun[i - 1] @ whole + path[-1, i - 1], -_HUGE, _HUGE)
+    for k in range(length):
+        begun = moved(begun)
+        path[k] += begun
+    return np.clip(path.transpose(1, 0, 2).reshape(-1, size)[:count], -_HUGE, _HUGE)
 
 
 @lru_cache(maxsize=_KEPT)
@@ -181,11 +200,10 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
     remembered, wanted = loop.commanded(s.t, seen, s.m)
     actuators = unlimited(mission, scheme, y, wanted)
     told = ca.SX.sym("told", wanted.numel())
+    x = _moved(mission)(s.t, s.x, s.actuators)
     if sampled:
-        x = loop.held(s.t, s.x, s.actuators, quiet)
         later = loop.advanced(s.t, seen, remembered, wanted, told)
     else:
-        x = loop.moved(s.t, s.x, s.actuators, quiet)
         later = loop.flowing(s.t, seen, remembered, wanted, told)
     made = loop.made(y, actuators)
     rows, late = rows_of(mission), s.actuators
@@ -211,6 +229,14 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
 def _effectiveness(loop: Loop, y: Any) -> Any:
     """Return what the flight software believes that each actuator makes, (R, N)."""
     return loop.actuation.matrix(loop.plant.measurement.split(y))
+
+
+@lru_cache(maxsize=_KEPT)
+def _moved(mission: Mission) -> ca.Function:
+    """Return (t, x, actuators) -> the plant's state one sample later, or its rate; the same for all schemes."""
+    loop = Loop(mission, mission.schemes[0])
+    s, moves = loop.symbols(), loop.held if mission.timing.mode == "sampled" else loop.moved
+    return ca.Function("moved", [s.t, s.x, s.actuators], [moves(s.t, s.x, s.actuators, mission.quiet())])
 
 
 def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:

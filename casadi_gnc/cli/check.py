@@ -33,9 +33,10 @@ def check(
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
     from casadi_gnc.checks import worst
-    from casadi_gnc.reports.style import check_page
 
     if report is not None:
+        from casadi_gnc.reports.style import check_page
+
         check_page(report)
     checked = _checked(problem, scheme)
     title, found = checked.title, checked.checks

@@ -32,8 +32,6 @@ def main() -> None:
             raise
         _silence()  # whoever read the answers has enough of them
         sys.exit(0)
-    except KeyboardInterrupt:
-        _end("casadi-gnc: interrupted; files already complete were kept", 130)
     except BrokenPipeError:
         _silence()
         sys.exit(0)

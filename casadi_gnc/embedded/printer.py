@@ -76,8 +76,8 @@ def print_function(
         else:
             flags = [nodes[i].is_flag for i in node.operands]
             try:
-                side_by_side = [False] * len(flags)
-                text = expression(node, flags if shared is None else side_by_side, maths, real)
+                side_by_side = (False,) * len(flags)
+                text = expression(node.code, tuple(flags) if shared is None else side_by_side, maths, real)
             except PrinterError as error:
                 raise PrinterError(f"{function.name()}: {error}") from None
             if shared is not None and node.is_flag:
@@ -89,7 +89,8 @@ def print_function(
     unused = []
     if arguments is None:
         arguments = [f"const gnc_real *{name}" for name in inputs] + [f"gnc_real *{name}" for name in outputs]
-        unused = [f"    (void){name};" for i, name in enumerate(inputs) if not _is_read(function, i)]
+        read = _read(function)
+        unused = [f"    (void){name};" for i, name in enumerate(inputs) if i not in read]
         unused += [f"    (void){name};" for i, name in enumerate(outputs) if not function.numel_out(i)]
     head = f"static void {function.name()}(\n    " + ",\n    ".join(arguments) + ")\n{"
     if shared is None:
@@ -114,11 +115,10 @@ def _as_number(code: int, text: str, flags: list[bool], real: Real) -> str:
     return f"({f'{x} + {y} > {zero}' if code == ca.OP_OR else text}) ? {one} : {zero}"
 
 
-def _is_read(function: ca.Function, port: int) -> bool:
-    return any(
-        function.instruction_id(k) == ca.OP_INPUT and function.instruction_input(k)[0] == port
-        for k in range(function.n_instructions())
-    )
+def _read(function: ca.Function) -> set[int]:
+    """Return the arguments of which some element is read."""
+    reads = [k for k in range(function.n_instructions()) if function.instruction_id(k) == ca.OP_INPUT]
+    return {function.instruction_input(k)[0] for k in reads}
 
 
 def _ports(function: ca.Function, side: Literal["in", "out"]) -> list[str]:

@@ -62,7 +62,7 @@ class _Printer:
         elif node.code == ca.OP_INPUT:
             text = _at(*self._order.place[k], arrays)
         else:
-            text = expression(node, [self._nodes[i].is_flag for i in node.operands], self._maths, self._real)
+            text = expression(node.code, tuple(self._nodes[i].is_flag for i in node.operands), self._maths, self._real)
             text = text.format(*(f"a{i}" for i in node.operands))
         return f"const {'gnc_flag' if node.is_flag else 'gnc_real'} a{k} = {text};"
 

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Literal
 
 import casadi as ca
@@ -95,13 +96,13 @@ class Node:
         return self.code in _FLAGS
 
 
-def expression(node: Node, flags: list[bool], maths: Math, real: Real) -> str:
-    """Return the right-hand side of a node; {0}, {1}, ... stand for its operands, of which some are flags."""
+@cache
+def expression(code: int, flags: tuple[bool, ...], maths: Math, real: Real) -> str:
+    """Return the right-hand side of an operation; {0}, {1}, ... stand for its operands, of which some are flags."""
     zero, one = c_constant(0.0, real), c_constant(1.0, real)
     # A flag in arithmetic becomes a number, a number in logic a flag.
     a = [f"({{{i}}} ? {one} : {zero})" if flag else f"{{{i}}}" for i, flag in enumerate(flags)]
     true = [f"{{{i}}}" if flag else f"({{{i}}} != {zero})" for i, flag in enumerate(flags)]
-    code = node.code
     suffix, prefix = "f" if real == "float" else "", "gnc_" if maths == "gnc" else ""
     if code in _COMPOSED and maths == "gnc":
         numbers = {"half": 0.5, "big": 2.0**28, "ln2": math.log(2.0)}

@@ -103,6 +103,10 @@ def arguments_table(name: str) -> type[Part]:
     return create_model("Arguments", __base__=Part, **fields)
 
 
+#: Beyond this lies no number of a craft, whatever its unit.
+_BEYOND = 1e12
+
+
 class ClaimModel(Part):
     """One printed number."""
 
@@ -132,6 +136,21 @@ class ClaimModel(Part):
             raise ValueError(f"claim {self.id!r} needs either a flight or a computation")
         if (self.flight is not None) != ((self.metric is not None) + (self.status is not None) == 1):
             raise ValueError(f"claim {self.id!r}: a flight, and nothing else, takes either a metric or a status")
+        return self
+
+    @model_validator(mode="after")
+    def _can_fail(self) -> ClaimModel:
+        most, told = abs(self.printed) or _BEYOND, f"claim {self.id!r} printed as {self.printed:g}"
+        for name, room, limit in (
+            ("tolerance", self.tolerance, 1.0),
+            ("tolerance_absolute", self.tolerance_absolute, most),
+        ):
+            if room > limit:
+                message = f"{name} is {room:g}, expected at most {limit:g}; it would take any answer to {told}"
+                raise MisfitError(message, name)
+        if self.metric is not None and (self.metric.threshold or 0.0) > _BEYOND:
+            message = f"threshold is {self.metric.threshold:g}, expected at most {_BEYOND:g}; no signal exceeds it"
+            raise MisfitError(message, "metric", "threshold")
         return self
 
 

@@ -13,6 +13,7 @@ state are none: nobody knows beforehand when they turn.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -42,17 +43,23 @@ class Timed:
 
     def __init__(self, expression: Any, time: ca.SX, columns: Mapping[str, ca.SX]) -> None:
         self._expression, self._own = ca.SX(expression), {_TIME: time, **columns}
-        known = ca.vertcat(*map(ca.vec, self._own.values()))
-        rest = [symbol for symbol in ca.symvar(self._expression) if not ca.depends_on(known, symbol)]
+        known = {symbol.element_hash() for column in self._own.values() for symbol in ca.symvar(column)}
+        rest = [symbol for symbol in ca.symvar(self._expression) if symbol.element_hash() not in known]
         self._own[_REST] = ca.vertcat(*rest) if rest else ca.SX(0, 1)
         self._names = list(self._own)
         ports = [ca.vec(column) for column in self._own.values()]
         self._tape = ca.Function("timed", ports, [ca.densify(self._expression)])
-        self._steps = [
-            (self._tape.instruction_id(k), self._tape.instruction_input(k), self._tape.instruction_output(k))
-            for k in range(self._tape.n_instructions())
+        # What time is not in decides nothing on it, and need not be read.
+        self._kinds = self._sorted() if ca.depends_on(self._expression, time) else []
+
+    @cached_property
+    def _steps(self) -> list[tuple[int, list[int], list[int]]]:
+        """The instructions of the expression: code, places that are read, places that are written."""
+        tape = self._tape
+        return [
+            (tape.instruction_id(k), tape.instruction_input(k), tape.instruction_output(k))
+            for k in range(tape.n_instructions())
         ]
-        self._kinds = self._sorted()
 
     def _sorted(self) -> list[bool]:
         """Return for each instruction whether it is a decision on time."""
@@ -87,16 +94,23 @@ class Timed:
 
         An expression without any is the same for every `middle`.
         """
+        if not self.decides:
+            (same,) = self._tape.call([ca.vec(ca.SX(each)) for each in self._given(time, columns)], True, False)
+            return ca.reshape(same, self._expression.shape)
         result, _ = self._walked(time, middle, columns)
         return result
 
     def decisions(self, time: Any) -> ca.SX:
         """Return what each decision is at a time, (K, 1)."""
-        return self._walked(time, time, self._own)[1]
+        return self._walked(time, time, self._own)[1] if self.decides else ca.SX(0, 1)
+
+    def _given(self, time: Any, columns: Mapping[str, Any]) -> list[ca.SX]:
+        """Return what stands at the ports of the tape."""
+        now = {**columns, _TIME: time, _REST: self._own[_REST]}
+        return [ca.SX(now[name]) for name in self._names]
 
     def _walked(self, time: Any, middle: Any, columns: Mapping[str, Any]) -> tuple[ca.SX, ca.SX]:
-        now = {**columns, _TIME: time, _REST: self._own[_REST]}
-        ports = [ca.SX(now[name]) for name in self._names]
+        ports = self._given(time, columns)
         result, taken = [ca.SX(0)] * self._expression.numel(), []
         # Place in the work vector -> its value in this stage, and in the middle: the same where time is not in it.
         value: dict[int, tuple[ca.SX, ca.SX]] = {}

@@ -105,8 +105,6 @@ class Loop:
         timed, middle = self._rate, t + step / 2
 
         def rate(at: Any, state: Any) -> Any:
-            if not timed.decides:
-                return self.moved(at, state, actuators, noise)
             return timed.at(at, middle, {"x": state, "actuators": actuators, "noise": noise})
 
         return runge_kutta(rate, t, x, step)

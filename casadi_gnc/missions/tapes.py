@@ -81,9 +81,9 @@ class Tapes:
 def function(name: str, inputs: dict[str, Any], outputs: dict[str, Any]) -> ca.Function:
     """Return an SX function with named dense ports, common subexpressions merged."""
     results = ca.cse([ca.densify(ca.SX(value)) for value in outputs.values()])
-    free = [
-        s for s in ca.symvar(ca.vertcat(*map(ca.vec, results))) if not ca.depends_on(ca.vertcat(*inputs.values()), s)
-    ]
+    known = {symbol.element_hash() for column in inputs.values() for symbol in ca.symvar(ca.SX(column))}
+    every = ca.symvar(ca.vertcat(*map(ca.vec, results)))
+    free = [symbol for symbol in every if symbol.element_hash() not in known]
     if free:
         raise FlightError(
             f"{', '.join(s.name() for s in free)} is a symbol, not a number; numbers fly, and "

@@ -8,13 +8,14 @@ A craft's folder has
 * `checks.py`, where there is more to say before it flies than for every craft.
 """
 
-from casadi_gnc.vehicles import (
-    combined_spacecraft,
-    docking_pair,
-    drag_free_pair,
-    proximity_pair,
-    satellite,
-    wheel_spacecraft,
-)
+from importlib import import_module
+from types import ModuleType
 
 __all__ = ["combined_spacecraft", "docking_pair", "drag_free_pair", "proximity_pair", "satellite", "wheel_spacecraft"]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Import a craft when it is first asked for: who flies one does not wait for the others."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module(f"{__name__}.{name}")

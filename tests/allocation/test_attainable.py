@@ -504,3 +504,17 @@ def test_forces_and_torques_have_spheres_of_their_own():
     assert alone == pytest.approx(1 / np.hypot(0.5, 10.0), rel=1e-12)
     with pytest.raises(AllocationError, match="units has 1 entries, expected 4"):
         attainable(problem, units=("N",))
+
+
+def test_the_largest_box_is_a_cube_of_each_kind():
+    """Rows that do not touch each other: per kind the weakest axis, by hand, in whatever unit the torques are."""
+    for torque_unit in (1.0, 1e3):
+        problem = AllocationProblem(np.diag([1.0, 2.0, 10.0 * torque_unit, 30.0 * torque_unit]), -1.0, 1.0)
+        found = attainable(problem, units=("N", "N", "N m", "N m"))
+        assert found.nominal.box.tolist() == pytest.approx([1.0, 1.0, 10.0 * torque_unit, 10.0 * torque_unit])
+    # Where one pair of actuators makes both, half of each is left of a corner.
+    both = AllocationProblem([[1.0, 1.0], [5.0, -5.0]], -1.0, 1.0)
+    assert attainable(both, units=("N", "N m")).nominal.box.tolist() == pytest.approx([1.0, 5.0])
+    # A force that cannot be made at all leaves a box of torques.
+    flat = AllocationProblem([[0.0, 0.0], [3.0, 0.0]], -1.0, 1.0)
+    assert attainable(flat, units=("N", "N m")).nominal.box.tolist() == pytest.approx([0.0, 3.0])

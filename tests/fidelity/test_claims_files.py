@@ -1,6 +1,7 @@
 """Verdicts are computed: a changed number changes them, and what fails is a row, not the end."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -9,7 +10,7 @@ import pytest
 
 from casadi_gnc import fidelity
 from casadi_gnc.errors import FlightError, ProblemError
-from casadi_gnc.fidelity.claims import ClaimModel
+from casadi_gnc.fidelity.claims import ClaimModel, read_claims
 from casadi_gnc.fidelity.verdict import Answer, Verdict
 
 HEAD = 'format = 1\nkind = "claims"\npaper = "a paper"\ndoi = "10.1/1"\n'
@@ -288,3 +289,22 @@ def test_a_condition_that_a_law_does_not_have_is_a_row(tmp_path):
 
     with pytest.raises(FlightError, match=r"ProximityTracking has no condition 'nothing'; there is gains\."):
         condition("nothing")
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ("tolerance = 1e300", "tolerance is 1e+300, expected at most 1;"),
+        ("tolerance = 1.01", "tolerance is 1.01, expected at most 1;"),
+        ("tolerance_absolute = 1e300", "tolerance_absolute is 1e+300, expected at most 0.00055;"),
+    ],
+)
+def test_a_tolerance_that_takes_any_answer_is_told(given, says, tmp_path):
+    """Zero, and twice what is printed, are within it: the claim could not fail."""
+    path = tmp_path / "claims.toml"
+    text = HEAD + CUBE.format(printed=5.5e-4, name="huang2020.attainable_cube")
+    path.write_text("\n".join(given if line.startswith("tolerance") else line for line in text.splitlines()))
+    with pytest.raises(ProblemError, match=re.escape(says)) as told:
+        read_claims(str(path))
+    place = 1 + path.read_text().splitlines().index(given)
+    assert f"claims.toml, line {place}" in str(told.value) or f"claims.toml:{place}" in str(told.value), told.value
