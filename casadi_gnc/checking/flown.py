@@ -39,10 +39,11 @@ def path(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
     states, later = np.empty((len(times), mission.truth.state.size)), np.empty_like(now)
     # In one piece of memory; CasADi's own chain of steps takes longer to build than to fly.
     memory, run = step.buffer()
+    buffer: Any = memory  # CasADi's annotations ask for a size that its own wrapper counts
     view: Any = memoryview
     for place, column in enumerate((now, at)):
-        memory.set_arg(place, view(column))
-    memory.set_res(0, view(later))
+        buffer.set_arg(place, view(column))
+    buffer.set_res(0, view(later))
     for k, time in enumerate(times):
         states[k], at[0] = now[: states.shape[1]], time
         run()

@@ -234,7 +234,7 @@ def _effectiveness(loop: Loop, y: Any) -> Any:
 @lru_cache(maxsize=_KEPT)
 def _moved(mission: Mission) -> ca.Function:
     """Return (t, x, actuators) -> the plant's state one sample later, or its rate; the same for all schemes."""
-    loop = Loop(mission, mission.schemes[0])
+    loop = Loop(mission, mission.schemes[0], averaged=True)
     s, moves = loop.symbols(), loop.held if mission.timing.mode == "sampled" else loop.moved
     return ca.Function("moved", [s.t, s.x, s.actuators], [moves(s.t, s.x, s.actuators, mission.quiet())])
 

@@ -10,6 +10,17 @@ A craft's folder has
 
 from importlib import import_module
 from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from casadi_gnc.vehicles import (
+        combined_spacecraft,
+        docking_pair,
+        drag_free_pair,
+        proximity_pair,
+        satellite,
+        wheel_spacecraft,
+    )
 
 __all__ = ["combined_spacecraft", "docking_pair", "drag_free_pair", "proximity_pair", "satellite", "wheel_spacecraft"]
 
