@@ -24,6 +24,7 @@ class Planted:
     scheme : the only one that is left.
     tables : requirements and dispersions, and what else is added.
     over : as for `falsify`.
+    cause : a normal dispersion whose upper end, alone, breaks; where noise decides whether it does.
     """
 
     base: str
@@ -31,6 +32,7 @@ class Planted:
     scheme: str
     tables: dict[str, Any]
     over: dict[str, list[Any]] = field(default_factory=dict)
+    cause: str = ""
 
     def write(self, file: Path, seed: int = 0) -> Path:
         """Write the problem file; its requirement is P, and `seed` is that of its noise."""
@@ -111,7 +113,7 @@ PLANTED = {
                     "key": "fault.1.effectiveness",
                     "choice": {"values": [1.0, 0.8, 0.3], "weights": [0.5, 0.495, 0.005]},
                 },
-                *_OF_THE_WHEEL_CRAFT,
+                {"key": "initial.rate_rad_per_s", "uniform": [-0.02, 0.02]},
             ],
         },
     ),
@@ -195,6 +197,7 @@ PLANTED = {
                 *_OF_THE_WHEEL_CRAFT,
             ],
         },
+        cause="sensors.mrp_deviation",
     ),
     # The rate loop, sampled ever more slowly: half a period of hold is a delay, and the last is just past its margin.
     "delay": Planted(
