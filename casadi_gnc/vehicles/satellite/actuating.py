@@ -20,7 +20,7 @@ from casadi_gnc.tables.part import MisfitError
 
 from . import part_tables
 from .momentum import MomentumSharing
-from .on_board import TorqueByField, WheelLimits
+from .on_board import LeastByField, TorqueByField, WheelLimits
 
 if TYPE_CHECKING:
     from .craft import SatelliteCraft
@@ -117,6 +117,9 @@ def actuation(craft: SatelliteCraft, known: Actuators, told: EffortKeys) -> Actu
         return Actuation.of(known, limit, keys.allocator(problem))
     if shared is not None:
         return Actuation.of(replace(known, inverse=shared), limit, Direct())
+    by_field = known.effectiveness
+    if isinstance(by_field, TorqueByField) and is_number(by_field.fixed) and not _spans(by_field.fixed):
+        return Actuation.of(replace(known, inverse=LeastByField(by_field)), limit, Direct())
     return Actuation.of(known, limit, keys.allocator(None))
 
 
@@ -137,6 +140,9 @@ def _most(craft: SatelliteCraft, known: Actuators) -> list[float]:
 def flaws(craft: SatelliteCraft, known: Actuators) -> Iterator[MisfitError]:
     """Yield whether wheels and thrusters leave an axis out."""
     if craft.magnetorquer:
+        coils = np.array(ca.DM(part_tables.directions(craft.magnetorquer, "axis")))
+        if not (craft.wheel or craft.thruster) and np.linalg.matrix_rank(coils, tol=1e-6) < 2:
+            yield MisfitError("coils along one axis make torque about one direction alone; turn one", "magnetorquer")
         return
     made = np.array(ca.DM(known.matrix(None)))
     strength = np.linalg.svd(made, compute_uv=False)

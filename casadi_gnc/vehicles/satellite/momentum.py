@@ -30,8 +30,7 @@ from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.linear import solve_symmetric
 from casadi_gnc.mechanics.rigid_body import inverse3
 
-#: Square of a field [T^2] below which no dipole is asked for more.
-_WEAKEST = 1e-14
+from .on_board import WEAKEST
 
 
 def right_inverse(matrix: Any) -> Any:
@@ -76,7 +75,7 @@ class MomentumSharing:
 
     def _dipoles(self, field: Any, stored: Any) -> Any:
         """Return the dipoles of the coils, (K,), within their limits."""
-        square = bounds.maximum(ca.sumsqr(field), _WEAKEST)
+        square = bounds.maximum(ca.sumsqr(field), WEAKEST)
         wanted = -self.unload / square * ca.cross(field, stored)
         if self.coils.shape[1] > 3:  # the least dipoles whose sum it is
             own = ca.mtimes(right_inverse(self.coils), wanted)
