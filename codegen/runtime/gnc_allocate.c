@@ -35,8 +35,8 @@ static int read_command(command_t *command, const data_t *data, const real *torq
         command->dead[i] = high - low <= 8 * EPS * larger(size_of(low), size_of(high)) + TINY ? 1 : 0;
         command->c[i] = -(data->m1[i] * data->preferred[i] + data->m2[i] * previous[i]);
     }
-    command->floor = 0;
-    command->careful = 0;
+    command->careful = CAREFUL_FROM_THE_START;
+    command->floor = NAME(floor_of)(data, command);
     sound &= GNC_ASSERT(data->ready == READY);
     return sound & GNC_ASSERT(is_finite(sum));
 }
@@ -82,8 +82,8 @@ static int report(const data_t *data, const command_t *command, const real *lowe
         result->unallocated[a] = (command->b[a] - point->y[a]) * data->inv_sqrt_h;
     }
     result->worst_error = SQUARE_ROOT(2 * point->worst) * data->inv_sqrt_h;
-    result->objective = 2 * point->phi;
-    result->gap = 2 * point->gap;
+    result->objective = 2 * data->scale * point->phi;
+    result->gap = 2 * data->scale * point->gap;
     result->relative_gap = point->gap > 0 ? point->gap / larger(point->phi, TINY) : 0;
     return sound;
 }
@@ -122,7 +122,8 @@ static void forget(workspace_t *work)
 /* ---- the solvers in turn ---------------------------------------------------------------------- */
 
 /* The active set from the last answer, within its budget, and if that does not arrive as from a reset workspace. */
-static int follow_sets(workspace_t *work, const data_t *data, command_t *command, point_t *point, int32_t *iterations)
+static int follow_sets(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
+                       int32_t *iterations)
 {
     int certified = 0;
     *iterations = 0;
@@ -140,31 +141,37 @@ static int follow_sets(workspace_t *work, const data_t *data, command_t *command
     return certified;
 }
 
-/* Rounding of the residuals ended the search above what is called close: what has been found is evaluated with twice
- * the digits, and if it is not good then, the interior point begins anew with them. */
-static int refine(workspace_t *work, const data_t *data, command_t *command, point_t *point, int32_t *iterations)
+/* Rounding of the residuals may have ended the path above what is called close: then what it found is evaluated with
+ * twice the digits. Where that is not good, or the path did not arrive, the interior point begins anew. */
+static void solve_anew(workspace_t *work, const data_t *data, command_t *command, point_t *point, int found,
+                       int32_t *iterations)
 {
-    int32_t more = 0;
-    real gap;
-    command->careful = 1;
-    command->floor = 0;
-    NAME(evaluate)(data, command, work->force, work->lambda, point);
-    gap = point->gap;
-    if (!is_optimal(data, point) && GNC_ASSERT(is_finite(gap))) {
-        real force[N], lambda[V];
-        (void)memcpy(force, work->force, sizeof force);
-        (void)memcpy(lambda, work->lambda, sizeof lambda);
-        (void)NAME(interior_point)(work, data, command, point, &more);
-        *iterations += more;
-        if (!(point->gap <= gap)) {
-            (void)memcpy(work->force, force, sizeof force);
-            (void)memcpy(work->lambda, lambda, sizeof lambda);
-            work->warm = 0;
-            NAME(evaluate)(data, command, work->force, work->lambda, point);
-        }
+    real gap = -1;
+    if (found) {
+        command->careful = 1;
+        NAME(evaluate)(data, command, work->force, work->lambda, point);
+        gap = point->gap;
     }
-    return point->gap <= (real)CLOSE * point->phi ||
-           (data->regularised != 0 && point->gap <= (real)1e-5 * point->phi);
+    work->smooth = 0; /* what the path found is kept where its changes would be */
+    (void)memcpy(work->force_change, work->force, sizeof work->force);
+    (void)memcpy(work->lambda_change, work->lambda, sizeof work->lambda);
+    if (!(found && is_optimal(data, point))) {
+        NAME(interior_point)(work, data, command, point, iterations);
+    }
+    if (found && !(point->gap <= gap)) {
+        (void)memcpy(work->force, work->force_change, sizeof work->force);
+        (void)memcpy(work->lambda, work->lambda_change, sizeof work->lambda);
+        work->warm = 0;
+        NAME(evaluate)(data, command, work->force, work->lambda, point);
+    }
+}
+
+/* Is the gap so small that the answer is usable? With the added M1 the condition is 1e9: there 1e-5 of the objective can
+ * be all that is left. */
+static int is_close(const data_t *data, const point_t *point)
+{
+    return is_optimal(data, point) ||
+           point->gap <= (data->regularised != 0 ? (real)CLOSE_REGULARISED : (real)CLOSE) * point->phi;
 }
 
 static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const real *torque,
@@ -197,22 +204,17 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
         result->path = GNC_ALLOC_PATH_ACTIVE_SET;
         certified = follow_sets(work, data, &command, &point, &result->active_set_iterations);
     }
-    if (!certified) {
+    if (!certified || !(point.gap <= (real)CLOSE * point.phi)) {
         result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
-        command.floor = NAME(floor_of)(data, &command);
-        certified = NAME(interior_point)(work, data, &command, &point, &result->interior_point_iterations);
-    }
-    if (!(point.gap <= (real)CLOSE * point.phi) && point.gap > 0) {
-        certified = refine(work, data, &command, &point, &result->interior_point_iterations);
-        result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
+        solve_anew(work, data, &command, &point, certified, &result->interior_point_iterations);
     }
     if (!report(data, &command, lower, upper, work, &point, result)) { /* overflow: numbers too large */
         forget(work);
         return hold(work, data, held, lower, upper, result);
     }
     (void)memcpy(work->answer, result->force, sizeof work->answer);
-    result->status = is_optimal(data, &point) ? GNC_ALLOC_OPTIMAL
-                     : certified              ? GNC_ALLOC_AT_ROUNDING
+    result->status = is_optimal(data, &point)  ? GNC_ALLOC_OPTIMAL
+                     : is_close(data, &point) ? GNC_ALLOC_AT_ROUNDING
                                               : GNC_ALLOC_NOT_CERTIFIED;
     return result->status;
 }

@@ -131,11 +131,13 @@ typedef struct {
     GNC_ALLOC_NAME(real) D[GNC_ALLOC_R][GNC_ALLOC_AT_LEAST_1(GNC_ALLOC_P)][GNC_ALLOC_V];
     GNC_ALLOC_NAME(real) Dv[GNC_ALLOC_V][GNC_ALLOC_R][GNC_ALLOC_AT_LEAST_1(GNC_ALLOC_P)];
     GNC_ALLOC_NAME(real) DD[GNC_ALLOC_V][GNC_ALLOC_AT_LEAST_1(GNC_ALLOC_TRIANGLE(GNC_ALLOC_P))];
+    GNC_ALLOC_NAME(real) column[GNC_ALLOC_N]; /* squares of the columns of sqrt(h) A0 */
     GNC_ALLOC_NAME(real) m1[GNC_ALLOC_N], m2[GNC_ALLOC_N], preferred[GNC_ALLOC_N];
     GNC_ALLOC_NAME(real) q[GNC_ALLOC_N], inv_q[GNC_ALLOC_N]; /* m1 + m2, its inverse or 0 */
     /* curvature of Newton steps, max(q, a little), and its inverse */
     GNC_ALLOC_NAME(real) curvature[GNC_ALLOC_N], inv_curvature[GNC_ALLOC_N];
     GNC_ALLOC_NAME(real) sqrt_h, inv_sqrt_h, tolerance;
+    GNC_ALLOC_NAME(real) scale; /* of the objective: h / sqrt_h^2 */
     int32_t original[GNC_ALLOC_V]; /* first vertex with the same D: v itself, or the one it copies */
     int32_t distinct;              /* number of vertices that are no copies */
     int32_t regularised;           /* 1: M1 = M2 = 0 was given and M1 was added */
@@ -161,6 +163,7 @@ typedef struct {
     int32_t smooth;                           /* 1: the sets stayed the same over that change */
     /* factors of the last Newton system; they hold while the set of free actuators does */
     GNC_ALLOC_NAME(real) L[GNC_ALLOC_K][GNC_ALLOC_K], W[GNC_ALLOC_K][GNC_ALLOC_K];
+    GNC_ALLOC_NAME(real) C[GNC_ALLOC_K][GNC_ALLOC_K], inv_L[GNC_ALLOC_K], inv_C[GNC_ALLOC_K];
     GNC_ALLOC_NAME(real) T[GNC_ALLOC_K][GNC_ALLOC_K], Tt[GNC_ALLOC_K][GNC_ALLOC_K];
     GNC_ALLOC_NAME(real) lambda_W[GNC_ALLOC_V]; /* vertex weights that made W and T */
     uint32_t free_set;                          /* bit i: actuator i was free */

@@ -26,8 +26,10 @@
 #include "gnc_allocate_internal.h"
 
 enum {
-    MAX_ROUNDS = 32 + N, /* pieces, block steps and exchanges in all */
+    MAX_PIECES = 16 + N, /* pieces and exchanges in all */
     BLOCK_STEPS = 6, /* steps that change all offenders at once */
+    FEW = 2,
+    MANY = 5,        /* vertices that the path begins with after a cold start */
     MAX_STUCK = 6    /* pieces of no length in a row: many obstacles at one point */
 };
 #define OPENING (real)0.01 /* room that open_up gives, of the box, the largest gradient, the worst q_v */
@@ -43,7 +45,6 @@ typedef struct {
     int newcomer;    /* what joined a set at the last stop: an actuator, a vertex (from N on) or NOTHING */
     int smooth;      /* 1: no set has changed */
     int stuck;       /* pieces of no length so far in a row */
-    int block_steps; /* steps that may change all offenders at once */
     int budget;      /* what is left of it */
     int exchanges;   /* of dependent vertices in a row, without a move */
     int dropped;     /* what the last of them dropped: an actuator came free, or a vertex (from N on) left */
@@ -251,7 +252,6 @@ static void begin(path_t *path, real *force, real *lambda, workspace_t *work, co
     path->newcomer = NOTHING;
     path->smooth = work->warm;
     path->stuck = 0;
-    path->block_steps = work->warm != 0 && data->distinct > 1 ? 0 : BLOCK_STEPS;
     path->budget = budget;
     path->exchanges = 0;
     path->dropped = NOTHING;
@@ -283,7 +283,7 @@ static int on_simplex(const real *lambda)
 }
 
 /* Is the point the answer, by its certificate or up to rounding? */
-static int is_there(const path_t *path, const workspace_t *work, const data_t *data, command_t *command,
+static int is_there(const path_t *path, const workspace_t *work, const data_t *data, const command_t *command,
                     const point_t *point)
 {
     int i, inside = 1, is_close = is_optimal(data, point);
@@ -294,16 +294,17 @@ static int is_there(const path_t *path, const workspace_t *work, const data_t *d
         return 0;
     }
     if (!is_close && path->last_gap > 0 && point->gap > (real)0.9 * path->last_gap) { /* is it rounding? */
-        command->floor = NAME(floor_of)(data, command);
         is_close = point->gap <= command->floor;
     }
     return is_close && on_simplex(work->lambda);
 }
 
-/* One step that changes all offenders at once, at fixed vertex weights. */
+/* One step that changes all offenders at once, at fixed vertex weights. Return whether there were any, 0 too where an
+ * assertion failed. */
 static int block_step(path_t *path, workspace_t *work, const data_t *data, const command_t *command,
                       const point_t *point)
 {
+    int changed;
     goal_t goal;
     vertices_t vert;
     vert.count = 0;
@@ -312,12 +313,56 @@ static int block_step(path_t *path, workspace_t *work, const data_t *data, const
         return 0;
     }
     path->budget -= 1;
-    if (change_all_bounds(work, &goal, command) != 0) {
-        path->smooth = 0;
-    } else {
-        path->block_steps = 0;
+    changed = change_all_bounds(work, &goal, command);
+    path->smooth = changed != 0 ? 0 : path->smooth;
+    return changed;
+}
+
+/* Go on from a cold start with the worst vertices alone, at equal weights: the path adds one that is missing faster than
+ * it finds out that all depend on each other. Where most of the error is that of the middle, beyond reach, few tie. */
+static void choose_vertices(workspace_t *work, const data_t *data, const point_t *point)
+{
+    int a, v, w, count;
+    real middle = 0;
+    for (a = 0; a < R; ++a) {
+        real sum = 0;
+        for (v = 0; v < V; ++v) {
+            sum += point->r[a][v];
+        }
+        middle += (real)0.5 * sum * sum / (real)(int)(V * V);
     }
-    return 1;
+    count = middle < (real)0.5 * point->worst ? MANY : FEW;
+    for (v = 0; v < V; ++v) {
+        int worse = 0; /* how many are */
+        for (w = 0; w < V; ++w) {
+            const int before = w < v ? point->q[w] >= point->q[v] : point->q[w] > point->q[v];
+            worse += data->original[w] == w ? before : 0;
+        }
+        work->active[v] = (int8_t)(data->original[v] == v && worse < count ? 1 : 0);
+        work->lambda[v] = work->active[v] != 0 ? 1 / (real)count : 0;
+        work->slack[v] = work->active[v] != 0 ? 0 : point->worst - point->q[v];
+    }
+}
+
+/* The first steps, which change all offenders at once: from a cold start, and where one vertex is all there is. Return
+ * whether they arrived. */
+static int block_steps(path_t *path, workspace_t *work, const data_t *data, const command_t *command, point_t *point,
+                       int most, int32_t *iterations)
+{
+    int k, going = 1, arrived = 0, changed = 1;
+    for (k = 0; k <= BLOCK_STEPS && going; ++k) {
+        NAME(evaluate)(data, command, work->force, work->lambda, point);
+        arrived = is_there(path, work, data, command, point);
+        going = !arrived && changed != 0 && k < most && k < BLOCK_STEPS && GNC_ASSERT(is_finite(point->gap));
+        if (going) {
+            changed = block_step(path, work, data, command, point);
+            *iterations += 1;
+        }
+    }
+    if (!arrived && data->distinct > MANY) {
+        choose_vertices(work, data, point);
+    }
+    return arrived;
 }
 
 /* One piece of the path: to the goal, or to the first obstacle, which changes sets. Where the active vertices depend on
@@ -366,28 +411,28 @@ static int piece(path_t *path, workspace_t *work, const data_t *data, const comm
     return 1;
 }
 
-int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
+int NAME(active_set)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
                      int budget, int32_t *iterations)
 {
-    int i, v, k, going = 1, arrived = 0;
+    const int most = budget < MAX_PIECES ? budget : MAX_PIECES; /* a round costs one at least */
+    const int was_warm = work->warm;
+    int i, v, k, going, arrived = 0;
     real force[N], lambda[V]; /* where the path began */
     path_t path;
-    begin(&path, force, lambda, work, data, command, budget);
     *iterations = 0;
-    for (k = 0; k <= MAX_ROUNDS && going; ++k) {
+    begin(&path, force, lambda, work, data, command, budget);
+    if (was_warm == 0 || data->distinct == 1) {
+        arrived = block_steps(&path, work, data, command, point, budget, iterations);
+    }
+    going = !arrived;
+    for (k = 0; k <= most && going; ++k) {
         if (path.exchanges == 0) {
             NAME(evaluate)(data, command, work->force, work->lambda, point);
             arrived = is_there(&path, work, data, command, point);
-            *iterations = k;
         }
-        going = !arrived && path.budget > 0 && GNC_ASSERT(is_finite(point->gap));
-        if (going && k < path.block_steps) {
-            going = block_step(&path, work, data, command, point);
-        } else if (going && k < MAX_ROUNDS) {
-            going = piece(&path, work, data, command, point);
-        } else {
-            continue; /* the end, by one count or the other */
-        }
+        going = !arrived && path.budget > 0 && k < most && GNC_ASSERT(is_finite(point->gap)) &&
+                piece(&path, work, data, command, point);
+        *iterations += going ? 1 : 0;
     }
     work->smooth = arrived ? path.smooth : 0;
     for (i = 0; i < N && arrived; ++i) { /* remember what this sample's change of the command did */

@@ -24,7 +24,7 @@
 #endif
 
 /* L L' = S_free diag(1/q) S_free', an outer product at a time. */
-static int factor_free_set(workspace_t *work, const data_t *data, real *inverse)
+static int factor_free_set(workspace_t *work, const data_t *data)
 {
     int i, k, l, e = 0;
     real packed[KT] = {0};
@@ -41,11 +41,11 @@ static int factor_free_set(workspace_t *work, const data_t *data, real *inverse)
             ++e;
         }
     }
-    return NAME(factor)(work->L, inverse, 4 * EPS);
+    return NAME(factor)(work->L, work->inv_L, 4 * EPS);
 }
 
 /* T = C^-1 L' */
-static void solve_for_T(workspace_t *work, real (*C)[K], const real *inverse)
+static void solve_for_T(workspace_t *work)
 {
     int i, k, l;
     for (k = 0; k < K; ++k) {
@@ -57,12 +57,12 @@ static void solve_for_T(workspace_t *work, real (*C)[K], const real *inverse)
         for (i = 0; i < k; ++i) {
             UNROLLED
             for (l = 0; l < K; ++l) {
-                row[l] -= C[k][i] * work->T[i][l];
+                row[l] -= work->C[k][i] * work->T[i][l];
             }
         }
         UNROLLED
         for (l = 0; l < K; ++l) {
-            work->T[k][l] = row[l] * inverse[k];
+            work->T[k][l] = row[l] * work->inv_C[k];
             work->Tt[l][k] = work->T[k][l];
         }
     }
@@ -73,7 +73,7 @@ int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
 {
     int i, v, known, same_set, same_weights, sound = 1;
     uint32_t free_set = 0, bit = 1;
-    real C[K][K], inverse[K], drift = 0;
+    real drift = 0;
     for (i = 0; i < N; ++i) {
         free_set |= work->side[i] != 0 ? 0U : bit;
         bit <<= 1;
@@ -91,16 +91,17 @@ int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
         return 1;
     }
     if (!same_set) {
-        sound = factor_free_set(work, data, inverse);
+        sound = factor_free_set(work, data);
         work->stamp = data->stamp;
         work->free_set = free_set;
     }
     if (!same_weights) { /* or else keep W: two sets compared on one path should see the same curvature */
         (void)memcpy(work->lambda_W, work->lambda, sizeof work->lambda);
+        sound &= NAME(curvature_in_y)(data, work->lambda_W, work->W);
     }
-    sound &= NAME(inner_matrix)(data, work->lambda_W, work->L, work->W, C);
-    sound &= NAME(factor)(C, inverse, 0);
-    solve_for_T(work, C, inverse);
+    NAME(inner_matrix)(work->L, work->W, work->C);
+    sound &= NAME(factor)(work->C, work->inv_C, 0);
+    solve_for_T(work);
     if (!sound) {
         work->stamp = 0; /* never to be used again */
     }
@@ -272,27 +273,37 @@ int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, c
 {
     int i, k, a;
     const int n = vert->count;
-    real d0[K], eps[K], dy[K], nu[K], dlambda[A], t, dt;
+    real fixed[K], free[K], eps[K], dy[K], nu[K], dlambda[A], t, dt;
     if (!GNC_ASSERT(is_within(n, 0, A))) {
         return 0;
     }
     t = n > 0 ? point->q[vert->list[0]] : point->worst;
-    set_zero(d0);
+    set_zero(fixed);
+    set_zero(free);
     for (i = 0; i < N; ++i) {
         const real bound = work->side[i] < 0 ? command->lower[i] : command->upper[i];
         const real d = work->side[i] != 0 ? bound - work->force[i] : -data->inv_curvature[i] * point->g[i];
         goal->force[i] = d;
+        real *const into = work->side[i] != 0 ? fixed : free;
         UNROLLED
         for (k = 0; k < K; ++k) {
-            d0[k] += data->St[i][k] * d;
+            into[k] += data->St[i][k] * d;
         }
     }
-    multiply(work->W, d0, nu);
+    forward(work->L, work->inv_L, free);
+    forward(work->C, work->inv_C, free);
+    multiply(work->W, fixed, nu);
     multiply(work->Tt, nu, eps);
-    dt = weigh_vertices(vert, n, point, d0, eps, dlambda);
-    multiply(work->T, eps, dy);
     for (k = 0; k < K; ++k) {
-        dy[k] = d0[k] - dy[k];
+        eps[k] -= free[k];
+    }
+    dt = weigh_vertices(vert, n, point, fixed, eps, dlambda);
+    backward(work->C, work->inv_C, eps);
+    for (k = 0; k < K; ++k) {
+        dy[k] = fixed[k];
+        for (i = 0; i <= k; ++i) {
+            dy[k] -= work->L[k][i] * eps[i];
+        }
     }
     multiply(work->W, dy, nu);
     (void)memcpy(goal->lambda, work->lambda, sizeof goal->lambda);

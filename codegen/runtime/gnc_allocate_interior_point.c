@@ -13,7 +13,8 @@
  */
 #include "gnc_allocate_internal.h"
 
-enum { MAX_STEPS = 26, MAX_CAREFUL_STEPS = 34 };
+enum { MAX_STEPS = 34 };
+#define NEAR_ROUNDING (real)16 /* of the gap that rounding explains: from there on residuals get twice the digits */
 #define SHORT_STEP (real)0.1 /* a step this short did not pay: centre instead */
 #define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
                               * easy problems and loses the way in degenerate ones */
@@ -40,19 +41,18 @@ static real step_length(const direction_t *dir, const iterate_t *it)
 
 /* Aim at equal products mu, less the cross terms that the last direction predicts if second_order is 1,
  * and with the loss of slack on a step of that length. */
-static void aim(target_t *target, const direction_t *dir, const command_t *command, real mu, real step,
-                real second_order)
+static void aim(direction_t *dir, const command_t *command, real mu, real step, real second_order)
 {
     int i, v;
     for (i = 0; i < N; ++i) {
         const real cross = second_order * dir->zl[i] * dir->F[i];
         const real cross_up = second_order * dir->zu[i] * dir->F[i];
-        target->zl[i] = command->dead[i] != 0 ? 0 : mu - cross;
-        target->zu[i] = command->dead[i] != 0 ? 0 : mu + cross_up;
+        dir->zl[i] = command->dead[i] != 0 ? 0 : mu - cross;
+        dir->zu[i] = command->dead[i] != 0 ? 0 : mu + cross_up;
     }
     for (v = 0; v < V; ++v) {
-        target->lambda[v] = mu - second_order * dir->lambda[v] * dir->rise[v];
-        target->bend[v] = step * step * dir->bend[v];
+        dir->lambda[v] = mu - second_order * dir->lambda[v] * dir->rise[v];
+        dir->bend[v] *= step * step;
     }
 }
 
@@ -182,13 +182,14 @@ static void take_step(iterate_t *it, real *force, const direction_t *dir, const 
         it->zl[i] += step * dir->zl[i];
         it->zu[i] += step * dir->zu[i];
         force[i] = it->down[i] < it->up[i] ? command->lower[i] + it->down[i] : command->upper[i] - it->up[i];
-        if (command->careful != 0 && size_of(moved) < smaller(it->down[i], it->up[i])) {
+        if (command->dead[i] != 0) {
+            force[i] = command->lower[i];
+        } else if (command->careful != 0 && size_of(moved) < smaller(it->down[i], it->up[i])) {
             force[i] = moved;
             it->down[i] = moved - command->lower[i];
             it->up[i] = command->upper[i] - moved;
-        }
-        if (command->dead[i] != 0) {
-            force[i] = command->lower[i];
+        } else {
+            continue; /* measured from its nearer bound */
         }
     }
     for (v = 0; v < V; ++v) {
@@ -198,10 +199,9 @@ static void take_step(iterate_t *it, real *force, const direction_t *dir, const 
 }
 
 /* The direction towards a target, and how far it may be followed: 0 where it cannot be computed. */
-static real towards(direction_t *dir, factors_t *fac, const target_t *target, const data_t *data,
-                    const iterate_t *it, const point_t *point)
+static real towards(direction_t *dir, factors_t *fac, const data_t *data, const iterate_t *it, const point_t *point)
 {
-    return NAME(interior_direction)(dir, fac, target, data, it, point) ? step_length(dir, it) : 0;
+    return NAME(interior_direction)(dir, fac, data, it, point) ? step_length(dir, it) : 0;
 }
 
 /* A predictor, a corrector, and if that leads nowhere a step back to the centre. */
@@ -210,7 +210,6 @@ static int iterate(iterate_t *it, real *force, const data_t *data, const command
 {
     factors_t fac;
     direction_t dir;
-    target_t target;
     real step, sigma;
     int v;
     for (v = 0; v < V; ++v) {
@@ -220,14 +219,14 @@ static int iterate(iterate_t *it, real *force, const data_t *data, const command
     if (!NAME(interior_factors)(&fac, data, command, it, point) || !GNC_ASSERT(it->mu > 0)) {
         return 0;
     }
-    (void)memset(&target, 0, sizeof target); /* predictor: all products to zero */
-    step = towards(&dir, &fac, &target, data, it, point);
+    (void)memset(&dir, 0, sizeof dir); /* predictor: all products to zero */
+    step = towards(&dir, &fac, data, it, point);
     sigma = mean_product(&dir, it, step, products) / it->mu;
-    aim(&target, &dir, command, sigma * sigma * sigma * it->mu, step, 1); /* corrector */
-    step = towards(&dir, &fac, &target, data, it, point);
+    aim(&dir, command, sigma * sigma * sigma * it->mu, step, 1); /* corrector */
+    step = towards(&dir, &fac, data, it, point);
     if (step < SHORT_STEP) { /* some product lags far behind: no progress, back to the centre */
-        aim(&target, &dir, command, it->mu, 0, 0);
-        step = towards(&dir, &fac, &target, data, it, point);
+        aim(&dir, command, it->mu, 0, 0);
+        step = towards(&dir, &fac, data, it, point);
     }
     if (!GNC_ASSERT(step > 0)) {
         return 0;
@@ -236,19 +235,18 @@ static int iterate(iterate_t *it, real *force, const data_t *data, const command
     return 1;
 }
 
-int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t *command,
-                         point_t *point, int32_t *iterations)
+void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
+                          int32_t *iterations)
 {
     iterate_t it;
-    real force[N], best, last = -1;
+    real force[N], best;
     int k, going;
-    const int most = command->careful != 0 ? MAX_CAREFUL_STEPS : MAX_STEPS;
     const int products = set_out(&it, force, data, command, point);
     rest(work, data, command, it.lambda, point);
     best = point->gap;
     going = !is_optimal(data, point);
     *iterations = 0;
-    for (k = 0; k <= MAX_CAREFUL_STEPS && going; ++k) {
+    for (k = 0; k <= MAX_STEPS && going; ++k) {
         *iterations = k;
         NAME(evaluate)(data, command, force, it.lambda, point);
         if (point->gap < best) {
@@ -257,11 +255,8 @@ int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t 
             (void)memcpy(work->lambda, it.lambda, sizeof it.lambda);
         }
         going = !is_optimal(data, point) && is_finite(point->gap);
-        if (best <= command->floor && point->gap > (real)0.9 * last) {
-            going = 0; /* below the rounding floor go on only while the gap still falls */
-        }
-        last = point->gap;
-        if (going && k < most) {
+        command->careful = point->gap <= NEAR_ROUNDING * command->floor ? 1 : command->careful;
+        if (going && k < MAX_STEPS) {
             going = iterate(&it, force, data, command, point, products);
         } else {
             going = 0;
@@ -271,7 +266,4 @@ int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t 
         NAME(evaluate)(data, command, work->force, work->lambda, point);
     }
     keep(work, data, &it, point);
-    /* With the added M1 the condition is 1e9: there 1e-5 of the objective can be all that is left. */
-    return is_optimal(data, point) || point->gap <= command->floor ||
-           (data->regularised != 0 && point->gap <= (real)1e-5 * point->phi);
 }

@@ -142,7 +142,8 @@ int NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *
     int v, sound;
     vertex_gradients(fac->z, data, point);
     sound = factor_actuators(fac, data, command, it);
-    sound &= NAME(inner_matrix)(data, it->lambda, fac->L, fac->W, fac->C);
+    sound &= NAME(curvature_in_y)(data, it->lambda, fac->W);
+    NAME(inner_matrix)(fac->L, fac->W, fac->C);
     sound &= NAME(factor)(fac->C, fac->inv_C, 0);
     project_vertices(fac);
     sound &= factor_B(fac, it);
@@ -158,13 +159,12 @@ int NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *
 }
 
 /* The vertex weights of the direction, and what they leave of eps for the forces. */
-static void vertex_direction(direction_t *dir, const factors_t *fac, const target_t *target, const iterate_t *it,
-                           real *eps)
+static void vertex_direction(direction_t *dir, const factors_t *fac, const iterate_t *it, real *eps)
 {
     int k, v;
     real excess = -1;
     for (v = 0; v < V; ++v) {
-        dir->lambda[v] = target->lambda[v] / it->lambda[v] - it->s[v] + target->bend[v];
+        dir->lambda[v] = dir->lambda[v] / it->lambda[v] - it->s[v] + dir->bend[v];
         excess += it->lambda[v];
     }
     for (k = 0; k < K; ++k) {
@@ -239,15 +239,15 @@ static void slack_along(direction_t *dir, const factors_t *fac, const data_t *da
     }
 }
 
-/* The direction towards the target products:
+/* The direction towards the products that it holds:
  *     d dF + S'(W dy + Z dlambda) = rho,   (s/lambda) dlambda + dt - Z'dy = beta,   sum lambda = 1 */
-int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *target,
-                             const data_t *data, const iterate_t *it, const point_t *point)
+int NAME(interior_direction)(direction_t *dir, factors_t *fac, const data_t *data, const iterate_t *it,
+                             const point_t *point)
 {
     int i, k;
     real rho[N], eps[K] = {0}, dy[K] = {0}, nu[K];
     for (i = 0; i < N; ++i) {
-        rho[i] = -point->g[i] + target->zl[i] / it->down[i] - target->zu[i] / it->up[i];
+        rho[i] = -point->g[i] + dir->zl[i] / it->down[i] - dir->zu[i] / it->up[i];
         UNROLLED
         for (k = 0; k < K; ++k) {
             eps[k] += data->St[i][k] * (rho[i] * fac->invd[i]);
@@ -255,7 +255,7 @@ int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *t
     }
     forward(fac->L, fac->inv_L, eps);
     forward(fac->C, fac->inv_C, eps);
-    vertex_direction(dir, fac, target, it, eps);
+    vertex_direction(dir, fac, it, eps);
     backward(fac->C, fac->inv_C, eps);
     pull_on_forces(nu, dir, fac, eps);
     for (i = 0; i < N; ++i) {
@@ -264,8 +264,8 @@ int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *t
             rho[i] -= data->S[k][i] * nu[k];
         }
         dir->F[i] = rho[i] * fac->invd[i];
-        dir->zl[i] = (target->zl[i] - it->zl[i] * dir->F[i]) / it->down[i] - it->zl[i];
-        dir->zu[i] = (target->zu[i] + it->zu[i] * dir->F[i]) / it->up[i] - it->zu[i];
+        dir->zl[i] = (dir->zl[i] - it->zl[i] * dir->F[i]) / it->down[i] - it->zl[i];
+        dir->zu[i] = (dir->zu[i] + it->zu[i] * dir->F[i]) / it->up[i] - it->zu[i];
         UNROLLED
         for (k = 0; k < K; ++k) {
             dy[k] += data->St[i][k] * dir->F[i]; /* S dF: closer to the truth than L eps */

@@ -73,19 +73,25 @@ typedef NAME(result) result_t;
 #define ARITHMETIC_FAULTS() gnc_arithmetic_faultsf()
 #define EPS 1.1920929e-7F /* distance from 1 to the next number */
 #define TINY 1e-30F
-#define DEFAULT_TOLERANCE 1e-3F
-#define ROUNDING_FLOOR 2e-6F
+#define DEFAULT_TOLERANCE 1e-5F
+#define CAREFUL_FROM_THE_START 1
+#define ROUNDING_FLOOR 1e-12F
 #define CURVATURE_FLOOR 1e-6F
 #define NO_CURVATURE_FLOOR 1e-4F
-#define CLOSE 1e-2F
+#define CLOSE 1e-4F
+#define CLOSE_REGULARISED 1e-4F
+#define ADDED_WEIGHT 1e-5F
 #define SPLITTER 4097.0F
 #else
 #define ARITHMETIC_FAULTS() gnc_arithmetic_faults()
 #define EPS 2.220446049250313e-16
 #define TINY 1e-200
 #define DEFAULT_TOLERANCE 1e-8
+#define CAREFUL_FROM_THE_START 0
 #define ROUNDING_FLOOR 5e-15  /* gap, of the size of phi over the box, that rounding explains */
 #define CLOSE 1e-6            /* gap, of phi, up to which an answer at the rounding floor is left at that */
+#define CLOSE_REGULARISED 1e-5 /* the same where M1 was added */
+#define ADDED_WEIGHT 1e-9      /* the M1 that is, of the torque term's curvature */
 #define SPLITTER 134217729.0  /* 2^27 + 1: cuts a number into two halves */
 #define CURVATURE_FLOOR 1e-12 /* least curvature of a Newton step, of that of the torque error in one force */
 #define NO_CURVATURE_FLOOR 1e-8 /* the same where there are no weights */
@@ -114,7 +120,7 @@ typedef struct {
     real previous[N];
     real lower[N], upper[N];
     int8_t dead[N]; /* 1: no room to move */
-    real floor;     /* gap that counts as zero, once somebody asked */
+    real floor;     /* gap that rounding explains */
     int careful;    /* 1: residuals with twice the digits */
 } command_t;
 
@@ -160,15 +166,12 @@ typedef struct {
     real B1[V], sum_B1;       /* B^-1 (1,...,1)' and its sum */
 } factors_t;
 
+/* Before a direction is computed zl, zu and lambda are what the products zl*(F-lo), zu*(hi-F), lambda*s should become,
+ * and bend the second-order loss of s that is counted with. */
 typedef struct {
     real F[N], zl[N], zu[N], lambda[V], t;
     real rise[V], bend[V]; /* s(a) = s + a rise - a^2 bend along the step */
 } direction_t;
-
-/* What the products zl*(F-lo), zu*(hi-F), lambda*s should become, and the second-order loss of s. */
-typedef struct {
-    real zl[N], zu[N], lambda[V], bend[V];
-} target_t;
 
 static inline int is_optimal(const data_t *data, const point_t *point)
 {
@@ -183,7 +186,8 @@ void NAME(residuals)(const data_t *data, const command_t *command, const real *f
 void NAME(evaluate)(const data_t *data, const command_t *command, const real *force,
                     const real *lambda, point_t *point);
 real NAME(floor_of)(const data_t *data, const command_t *command);
-int NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K]);
+int NAME(curvature_in_y)(const data_t *data, const real *lambda, real (*W)[K]);
+void NAME(inner_matrix)(real (*L)[K], real (*W)[K], real (*C)[K]);
 int NAME(factor)(real (*matrix)[K], real *inverse, real lost);
 
 /* gnc_allocate_direction.c */
@@ -195,19 +199,20 @@ int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, c
 /* gnc_allocate_interior_step.c */
 int NAME(interior_factors)(factors_t *fac, const data_t *data, const command_t *command,
                            const iterate_t *it, const point_t *point);
-int NAME(interior_direction)(direction_t *dir, factors_t *fac, const target_t *target,
-                             const data_t *data, const iterate_t *it, const point_t *point);
+int NAME(interior_direction)(direction_t *dir, factors_t *fac, const data_t *data, const iterate_t *it,
+                             const point_t *point);
 
 /* gnc_allocate_exchange.c: make dependent vertices fewer by one, or free an actuator; return what was dropped. */
 int NAME(exchange)(workspace_t *work, const vertices_t *vert, const data_t *data,
                    const command_t *command, point_t *point, int last, int newcomer);
 void NAME(change_set)(workspace_t *work, int which, int upwards);
 
-/* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: return 1 if the answer in the workspace
- * is certified; the point belongs to that answer. The budget is WARM_WORK or COLD_WORK. */
-int NAME(interior_point)(workspace_t *work, const data_t *data, const command_t *command,
-                         point_t *point, int32_t *iterations);
-int NAME(active_set)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
+/* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: the point belongs to the answer in the workspace. The
+ * former leaves the best of its iterates and switches the command to careful where it must; the latter returns 1 if
+ * the answer is certified, or as far as rounding lets it be; its budget is WARM_WORK or COLD_WORK. */
+void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
+                          int32_t *iterations);
+int NAME(active_set)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
                      int budget, int32_t *iterations);
 
 /* ---- small dense algebra: lower triangles, inverse diagonals ---------------------------------- */

@@ -7,17 +7,28 @@
  */
 #include "gnc_allocate_internal.h"
 
-/* A number as the sum of two, the second what the first lost in rounding. */
+/* A number as the sum of two, the second what the first lost in rounding; or a factor in two halves. */
 typedef struct {
     real high, low;
 } pair_t;
 
-/* sum + a * b with about twice the digits (T. J. Dekker, 1971, doi:10.1007/BF01397083). */
-static pair_t plus_product(pair_t sum, real a, real b)
+/* The halves of a number, so short that products of them are exact. */
+static pair_t halves(real a)
 {
-    const real product = a * b, ca = (real)SPLITTER * a, cb = (real)SPLITTER * b;
-    const real a1 = ca - (ca - a), b1 = cb - (cb - b), a2 = a - a1, b2 = b - b1;
-    const real lost = a2 * b2 - (((product - a1 * b1) - a2 * b1) - a1 * b2);
+    const real large = (real)SPLITTER * a;
+    pair_t half;
+    half.high = large - (large - a);
+    half.low = a - half.high;
+    return half;
+}
+
+/* sum + a * b with about twice the digits, given the halves of b (T. J. Dekker, 1971, doi:10.1007/BF01397083). */
+static pair_t plus_product(pair_t sum, real a, real b, pair_t half_b)
+{
+    const pair_t half = halves(a);
+    const real product = a * b;
+    const real lost = half.low * half_b.low -
+                      (((product - half.high * half_b.high) - half.low * half_b.high) - half.high * half_b.low);
     pair_t total;
     real part;
     total.high = sum.high + product;
@@ -30,20 +41,28 @@ static pair_t plus_product(pair_t sum, real a, real b)
 static void careful_residuals(const data_t *data, const command_t *command, const real *force, point_t *point)
 {
     int i, k, a, j, v;
-    pair_t y[K];
+    pair_t y[K], half[K];
     for (k = 0; k < K; ++k) {
         y[k].high = 0;
         y[k].low = 0;
-        for (i = 0; i < N; ++i) {
-            y[k] = plus_product(y[k], data->S[k][i], force[i]);
+    }
+    for (i = 0; i < N; ++i) {
+        const pair_t half_F = halves(force[i]);
+        for (k = 0; k < K; ++k) {
+            y[k] = plus_product(y[k], data->St[i][k], force[i], half_F);
         }
+    }
+    for (k = 0; k < K; ++k) {
         point->y[k] = y[k].high + y[k].low;
+        half[k] = halves(y[k].high);
     }
     for (a = 0; a < R; ++a) {
+        const pair_t one = {1, 0};
+        const pair_t middle = plus_product(y[a], -command->b[a], 1, one);
         for (v = 0; v < V; ++v) {
-            pair_t r = plus_product(y[a], -1, command->b[a]);
+            pair_t r = middle;
             for (j = 0; j < P; ++j) {
-                r = plus_product(r, data->D[a][j][v], y[R + j].high);
+                r = plus_product(r, data->D[a][j][v], y[R + j].high, half[R + j]);
                 r.low += data->D[a][j][v] * y[R + j].low;
             }
             point->r[a][v] = r.high + r.low;
@@ -164,23 +183,23 @@ void NAME(evaluate)(const data_t *data, const command_t *command, const real *fo
 real NAME(floor_of)(const data_t *data, const command_t *command)
 {
     int i, a;
-    real box = 0, weights = 0;
-    point_t corner;
+    real box = 0, corner = 0, weights = 0;
+    for (a = 0; a < R; ++a) {
+        corner += command->b[a] * command->b[a];
+    }
     for (i = 0; i < N; ++i) {
         const real width = command->upper[i] - command->lower[i];
         const real effort = size_of(command->lower[i] - data->preferred[i]) + width;
         const real change = size_of(command->lower[i] - command->previous[i]) + width;
         weights += data->m1[i] * effort * effort + data->m2[i] * change * change;
-        for (a = 0; a < R; ++a) {
-            box += data->S[a][i] * width * data->S[a][i] * width;
-        }
+        box += data->column[i] * width * width;
+        corner += data->column[i] * command->lower[i] * command->lower[i];
     }
-    NAME(residuals)(data, command, command->lower, &corner);
-    return (real)ROUNDING_FLOOR * (weights + larger(2 * corner.worst, box));
+    return (real)ROUNDING_FLOOR * (weights + larger(corner, box));
 }
 
-/* W = sum lambda_v [I D_v]'[I D_v], the curvature of the lambda-weighted function in y; return sum lambda_v. */
-static real curvature_in_y(const data_t *data, const real *lambda, real (*W)[K])
+/* W = sum lambda_v [I D_v]'[I D_v], the curvature of the lambda-weighted function in y. */
+int NAME(curvature_in_y)(const data_t *data, const real *lambda, real (*W)[K])
 {
     int k, l, v;
     real sum = 0;
@@ -210,40 +229,37 @@ static real curvature_in_y(const data_t *data, const real *lambda, real (*W)[K])
             W[l][k] = W[k][l];
         }
     }
-    return sum;
+    return GNC_ASSERT(sum > 0);
 }
 
-/* W as above, and the lower triangle of C = I + L' W L. With L L' = S diag(1/d) S' the latter carries the
- * whole Newton system, and its eigenvalues are 1 or more: safe to factor whatever the data. */
-int NAME(inner_matrix)(const data_t *data, const real *lambda, real (*L)[K], real (*W)[K], real (*C)[K])
+/* The lower triangle of C = I + L' W L. With L L' = S diag(1/d) S' it carries the whole Newton system, and its
+ * eigenvalues are 1 or more: safe to factor whatever the data. */
+void NAME(inner_matrix)(real (*L)[K], real (*W)[K], real (*C)[K])
 {
     int i, k, l;
-    real WL[K][K];
-    const real sum = curvature_in_y(data, lambda, W);
     for (k = 0; k < K; ++k) {
         real row[K];
         set_zero(row);
         for (i = 0; i < K; ++i) {
             UNROLLED
-            for (l = 0; l <= i; ++l) {
+            for (l = 0; l < K; ++l) { /* beyond its triangle L is zero */
                 row[l] += W[k][i] * L[i][l];
             }
         }
-        (void)memcpy(WL[k], row, sizeof row);
+        (void)memcpy(C[k], row, sizeof row);
     }
-    for (k = 0; k < K; ++k) {
+    for (k = 0; k < K; ++k) { /* from W L in place: row k asks for the rows from k on */
         real row[K];
         set_zero(row);
         row[k] = 1;
         for (i = k; i < K; ++i) {
             UNROLLED
             for (l = 0; l < K; ++l) {
-                row[l] += L[i][k] * WL[i][l];
+                row[l] += L[i][k] * C[i][l];
             }
         }
         (void)memcpy(C[k], row, sizeof row);
     }
-    return GNC_ASSERT(sum > 0);
 }
 
 /* A = L L' in place. A pivot lost in rounding becomes a zero column: S may have dependent rows

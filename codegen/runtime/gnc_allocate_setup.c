@@ -43,6 +43,7 @@ static real set_matrices(data_t *data, const problem_t *problem)
         int e = 0;
         for (a = 0; a < R; ++a) {
             data->S[a][i] = data->sqrt_h * problem->A0[a][i];
+            data->column[i] += data->S[a][i] * data->S[a][i];
             size_A0 += data->S[a][i] * data->S[a][i];
         }
         for (j = 0; j < P; ++j) {
@@ -61,15 +62,24 @@ static real set_matrices(data_t *data, const problem_t *problem)
     return size_A0;
 }
 
-/* N times the torque term's curvature in one actuator's force: for columns alike that of all together. */
-static real size_of_column(const data_t *data, int i)
+/* The square root of h, and its inverse. In single precision the power of two that is nearest to it, so that S = sqrt(h)
+ * [A0; E] is not rounded, which alone would cost 1e-5 of the objective; what that is off goes to the weights. */
+static void set_scale(data_t *data, real h)
 {
-    int a;
-    real sum = 0;
-    for (a = 0; a < R; ++a) {
-        sum += data->S[a][i] * data->S[a][i];
+    real root = SQUARE_ROOT(h);
+#ifdef GNC_ALLOC_REAL_FLOAT
+    int k;
+    real power = 1;
+    for (k = 0; k < 75; ++k) { /* from the least number to the largest */
+        power *= (real)1.5 * power < root ? 2 : (real)0.75 * power > root ? (real)0.5 : 1;
     }
-    return (real)(int)N * sum;
+    root = power;
+    data->scale = h / (root * root);
+#else
+    data->scale = 1;
+#endif
+    data->sqrt_h = root;
+    data->inv_sqrt_h = 1 / root;
 }
 
 /* Weights and the curvature of Newton steps; return 0 where the numbers are too large for it. */
@@ -80,20 +90,20 @@ static int set_weights(data_t *data, const problem_t *problem, real size_A0)
     for (i = 0; i < N; ++i) {
         weight_sum += problem->m1[i] + problem->m2[i];
     }
-    /* Without any weight the forces are not unique; 1e-9 of the torque term's curvature makes them so. */
+    /* Without any weight the forces are not unique; a little of the torque term's curvature makes them so. */
     data->regularised = weight_sum <= 0 && problem->keep_zero_weights == 0;
     for (i = 0; i < N; ++i) {
         real least, sum;
-        data->m1[i] = data->regularised != 0 ? (real)1e-9 * size_A0 : problem->m1[i];
-        data->m2[i] = problem->m2[i];
+        data->m1[i] = data->regularised != 0 ? (real)ADDED_WEIGHT * size_A0 : problem->m1[i] / data->scale;
+        data->m2[i] = problem->m2[i] / data->scale;
         data->preferred[i] = problem->preferred[i];
         sum = data->m1[i] + data->m2[i];
         data->q[i] = is_finite(1 / sum) ? sum : 0; /* subnormal weights bend nothing: no curvature */
         data->inv_q[i] = data->q[i] > 0 ? 1 / data->q[i] : 0;
         /* Zero or vanishing weights: a Newton step needs some curvature to be well defined. Adding it
          * to the step, not to the problem, makes the iteration a proximal-point method. Each actuator has
-         * its own: of that of the strongest one a weak one would hardly move. */
-        least = (data->q[i] > 0 ? (real)CURVATURE_FLOOR : (real)NO_CURVATURE_FLOOR) * size_of_column(data, i);
+         * its own, N times the torque term's in its force: of that of the strongest one a weak one would hardly move. */
+        least = (data->q[i] > 0 ? (real)CURVATURE_FLOOR : (real)NO_CURVATURE_FLOOR) * (real)(int)N * data->column[i];
         data->curvature[i] = larger(data->q[i], larger(least, TINY));
         data->inv_curvature[i] = 1 / data->curvature[i];
         sound &= GNC_ASSERT(is_finite(data->curvature[i]));
@@ -180,8 +190,7 @@ int32_t NAME(setup)(data_t *data, const problem_t *problem)
     if (!GNC_ASSERT(problem != NULL) || !problem_is_sound(problem)) {
         return GNC_ALLOC_BAD_PROBLEM;
     }
-    data->sqrt_h = SQUARE_ROOT(problem->h);
-    data->inv_sqrt_h = 1 / data->sqrt_h;
+    set_scale(data, problem->h);
     data->tolerance = problem->tolerance > 0 ? problem->tolerance : (real)DEFAULT_TOLERANCE;
     size_A0 = set_matrices(data, problem);
     if (!set_weights(data, problem, size_A0) || !set_vertices(data, problem)) {

@@ -261,7 +261,7 @@ def check(problem, u, previous, lower, upper, step, results, limit=1e-8):
         assert abs(r["gap"] - gap) <= 1e-9 * f + 1e-15 * scale
         assert abs(r["objective"] - f) <= 1e-11 * f + 1e-15 * scale
         assert abs(np.sum(r["lam"]) - 1) < 1e-12
-        assert r["interior_point_iterations"] <= 26 + 34  # plain, and with twice the digits
+        assert r["interior_point_iterations"] <= 34
 
 
 @pytest.mark.parametrize("family", oa.FAMILIES)
@@ -422,21 +422,47 @@ def test_many_vertices_and_six_rows():
         check(problem, u, previous, np.zeros(N), np.full(N, oa.MAX_FORCE), None, results)
 
 
-def test_single_precision():
-    """Float reaches 1e-3 of the objective where the torque can be made to a part in a thousand, and says so if not."""
-    rng = np.random.default_rng(6)
+@pytest.mark.parametrize("family", [f for f in oa.FAMILIES if f != "mixed_zero"])
+def test_single_precision(family):
+    """The gap that a float reports is that of its own numbers, and 1e-5 of the objective but where all is lost.
+
+    Lost are some of the problems with h up to 1e9 or next to no weights: their status says so. Where only some weights
+    are zero single precision certifies a third.
+    """
+    rng, said, true, lost = np.random.default_rng(6), [], [], 0
+    for N, R in ((4, 3), (12, 3), (24, 6)):
+        allocator = Allocator(N, R, 3, 8, single=True)
+        for _ in range(4):
+            problem, *commands, step = oa.instance(rng, family, N, R)
+            assert allocator.setup(*problem) == oa.OPTIMAL
+            _, results = allocator.sequence(*commands, step, mode=WARM)
+            lost += int((results["status"] == oa.NOT_CERTIFIED).sum())
+            said += [r["relative_gap"] for r in results]
+            true += oa.gaps_of_floats(problem, *commands, step, results)
+    said, true = np.array(said, float), np.array(true)
+    assert np.abs(said - true).max() <= 1e-3 * true.max() + 1e-6
+    assert np.median(true) <= 1e-5
+    assert np.quantile(true, 0.98) <= 1e-4 if family != "h" else lost <= 0.15 * len(true)
+    assert lost <= 0.02 * len(true) or family == "h"
+
+
+def test_single_precision_flies_a_slew(flights):
+    """Every sample within 1e-5 of the least cost, by the true gap and by the double's answer, and few steps each."""
     single, double = Allocator(12, 3, 3, 8, single=True), Allocator(12, 3, 3, 8)
-    u, previous = rng.normal(size=(300, 3)) * 6e-4, rng.uniform(0, oa.MAX_FORCE, (300, 12))
+    flight = [flights["slew"][name] for name in ("u", "previous", "lower", "upper")]
     for allocator in (single, double):
-        allocator.setup(*PLAIN[:5], 1e4)
-    for mode in (COLD, WARM):
-        _, a = single.sequence(u, previous, 0, oa.MAX_FORCE, mode=mode)
-        _, b = double.sequence(u, previous, 0, oa.MAX_FORCE, mode=mode)
-        assert np.isfinite(a["force"]).all()
-        assert (np.isin(a["status"], (oa.OPTIMAL, oa.AT_ROUNDING))).all()
-        assert (a["objective"] <= b["objective"] * 1.01 + 1e-9).all()
-        torque = (a["force"].astype(float) - b["force"]) @ oa.A0_2020.T
-        assert np.abs(torque).max() < 3e-3 * 1.5e-3
+        allocator.setup(*PLAIN)
+    _, a = single.sequence(*flight, mode=WARM)
+    _, b = double.sequence(*flight, mode=WARM)
+    problem = (*PLAIN[:3], np.ones(12), np.ones(12), PLAIN[5], np.zeros(12))
+    true = oa.gaps_of_floats(problem, *[f[::10] for f in flight], None, a[::10])
+    assert (a["status"] == oa.OPTIMAL).all()
+    assert max(true) <= 1.01e-5
+    # 1e-6: the command itself is rounded, by 6e-8 of a norm whose square h multiplies
+    assert (a["objective"] <= b["objective"] * (1 + 1e-5) + 1e-6 * b["objective"].max()).all()
+    # strong convexity: (m1 + m2) |F - F*|^2 <= gap, here 2 |.|^2 of floats and doubles
+    assert (2 * ((a["force"] - b["force"]) ** 2).sum(axis=1) <= 4.1e-5 * b["objective"]).all()
+    assert np.median(a["active_set_iterations"]) <= 2
 
 
 # ---- flights ------------------------------------------------------------------------------------------------------

@@ -383,3 +383,22 @@ def certificate(problem, u, previous, lower, upper, force, lam, number=np.longdo
         + (m1 * (abs(lower - preferred) + width) ** 2 + m2 * (abs(lower - previous) + width) ** 2).sum()
     )
     return gap, objective, scale
+
+
+def gaps_of_floats(problem, u, previous, lower, upper, step, results):
+    """Return the relative gap of each answer of a solver of floats, for the problem as floats state it."""
+
+    def rounded(value):
+        return None if value is None else np.asarray(np.asarray(value, np.float32), float)
+
+    problem = [rounded(part) for part in problem]
+    u, previous, lower, upper, step = (rounded(part) for part in (u, previous, lower, upper, step))
+    if not (problem[3] + problem[4]).any():
+        problem[3] = np.full(len(problem[3]), np.float32(1e-5) * problem[5] * (problem[0] ** 2).sum())
+    found = []
+    for k, r in enumerate(results):
+        box = effective_box(lower[k] if lower.ndim > 1 else lower, upper[k] if upper.ndim > 1 else upper, previous[k], step)
+        force = np.clip(np.asarray(r["force"], float), *box)  # a bound of the rate box may be rounded
+        gap, f, _ = certificate(problem, u[k], previous[k], *box, force, np.asarray(r["lam"], float))
+        found.append(float(gap / f) if f > 0 else 0.0)
+    return found
