@@ -147,7 +147,7 @@ static void solve_anew(workspace_t *work, const data_t *data, command_t *command
                        int32_t *iterations)
 {
     real gap = -1;
-    if (found) {
+    if (found != 0) {
         command->careful = 1;
         NAME(evaluate)(data, command, work->force, work->lambda, point);
         gap = point->gap;
@@ -182,6 +182,8 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
     point_t point;
     int certified = 0, follow;
     const real *held = previous;
+    point.gap = 0; /* nothing has been found */
+    point.phi = 0;
     if (!GNC_ASSERT(result != NULL)) {
         return GNC_ALLOC_BAD_COMMAND;
     }

@@ -29,11 +29,11 @@
  *     GNC_ALLOC_REAL_FLOAT   defined: float, else double
  *     GNC_ALLOC_PREFIX  prefix of every symbol; two solvers in one program differ in it
  *
- * What is certified: gap <= tolerance * f (1e-8 in double), status OPTIMAL; or gap <= 1e-6 f (float: 1e-2),
+ * What is certified: gap <= tolerance * f (1e-8; float: 1e-5), status OPTIMAL; or gap <= 1e-6 f (float: 1e-4),
  * status AT_ROUNDING. Where rounding of the residuals hides so small a gap (f tiny against its size over the box),
- * they are summed with twice the digits and the interior point begins anew. If M1 = M2 = 0 the forces are not
- * unique and the set-up adds M1 = 1e-9 h |A0|_F^2 I, which is part of f and of its certificate; up to 1e-5 f
- * counts as rounding then. Single zero weights are allowed and nothing is added.
+ * they are summed with twice the digits, in float always. If M1 = M2 = 0 the forces are not unique and the set-up
+ * adds M1 = 1e-9 h |A0|_F^2 I (float: 1e-5), which is part of f and of its certificate; up to 1e-5 f (float: 1e-3)
+ * counts as rounding then. Single zero weights are allowed and nothing is added; in float few of these are certified.
  *
  * The header may be included again with other sizes and another prefix. No heap, no globals, no
  * recursion, every loop is bounded; all state lies in the caller's structs, so calls on different
@@ -57,7 +57,7 @@
 /* How a call ended. <prefix>_status_text() gives the sentence for each. */
 enum gnc_alloc_status {
     GNC_ALLOC_OPTIMAL = 0,       /* gap <= tolerance * objective */
-    GNC_ALLOC_AT_ROUNDING = 1,   /* gap <= 1e-6 objective (float: 1e-2); usable */
+    GNC_ALLOC_AT_ROUNDING = 1,   /* gap <= 1e-6 objective (float: 1e-4); usable */
     GNC_ALLOC_NOT_CERTIFIED = 2, /* iteration limit: feasible, its gap is reported */
     GNC_ALLOC_BAD_COMMAND = 3,   /* not finite, too large, lo > hi, absent: last feasible answer returned */
     GNC_ALLOC_BAD_PROBLEM = 4    /* set-up refused: weights, h, numbers that are not finite, a build with fused operations */
@@ -117,8 +117,8 @@ typedef struct {
     GNC_ALLOC_NAME(real) m2[GNC_ALLOC_N];        /* >= 0 */
     GNC_ALLOC_NAME(real) preferred[GNC_ALLOC_N]; /* Fs, often 0 */
     GNC_ALLOC_NAME(real) h;                      /* > 0 */
-    GNC_ALLOC_NAME(real) tolerance;              /* relative gap; 0: 1e-8 (double), 1e-3 (float) */
-    int32_t keep_zero_weights;                   /* 0: if M1 = M2 = 0, then M1 = 1e-9 h |A0|_F^2 */
+    GNC_ALLOC_NAME(real) tolerance;              /* relative gap; 0: 1e-8 (double), 1e-5 (float) */
+    int32_t keep_zero_weights;                   /* 0: if M1 = M2 = 0, then M1 = 1e-9 h |A0|_F^2 (float: 1e-5) */
 } GNC_ALLOC_NAME(problem);
 
 /* Everything that does not change from sample to sample. Constant after the set-up, may be shared. */

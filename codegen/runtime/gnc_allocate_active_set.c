@@ -19,15 +19,16 @@
  * The path pays while it is short. Work that starts from the last answer has a budget (WARM_WORK): after a jump of the
  * command most pieces of a long path would lie ahead, and starting anew costs less than walking it.
  *
- * Two shortcuts save pieces. On a steady slew the step from the last sample is repeated in proportion
+ * Three shortcuts save pieces. On a steady slew the step from the last sample is repeated in proportion
  * to the command first, so that the Newton step only corrects. Without a previous answer, and when only
- * one vertex exists, a few steps that do change all offenders at once come first, at fixed lambda.
+ * one vertex exists, a few steps that do change all offenders at once come first, at fixed lambda; then
+ * the path begins with the vertices that are worst there and not with all of them.
  */
 #include "gnc_allocate_internal.h"
 
 enum {
     MAX_PIECES = 16 + N, /* pieces and exchanges in all */
-    BLOCK_STEPS = 6, /* steps that change all offenders at once */
+    MAX_BLOCK_STEPS = 6, /* steps that change all offenders at once */
     FEW = 2,
     MANY = 5,        /* vertices that the path begins with after a cold start */
     MAX_STUCK = 6    /* pieces of no length in a row: many obstacles at one point */
@@ -329,14 +330,16 @@ static void choose_vertices(workspace_t *work, const data_t *data, const point_t
         for (v = 0; v < V; ++v) {
             sum += point->r[a][v];
         }
-        middle += (real)0.5 * sum * sum / (real)(int)(V * V);
+        middle += (real)0.5 * sum * sum / ((real)(int)V * (real)(int)V);
     }
     count = middle < (real)0.5 * point->worst ? MANY : FEW;
     for (v = 0; v < V; ++v) {
         int worse = 0; /* how many are */
-        for (w = 0; w < V; ++w) {
-            const int before = w < v ? point->q[w] >= point->q[v] : point->q[w] > point->q[v];
-            worse += data->original[w] == w ? before : 0;
+        for (w = 0; w < v; ++w) {
+            worse += data->original[w] == w && point->q[w] >= point->q[v] ? 1 : 0;
+        }
+        for (w = v + 1; w < V; ++w) {
+            worse += data->original[w] == w && point->q[w] > point->q[v] ? 1 : 0;
         }
         work->active[v] = (int8_t)(data->original[v] == v && worse < count ? 1 : 0);
         work->lambda[v] = work->active[v] != 0 ? 1 / (real)count : 0;
@@ -350,11 +353,11 @@ static int block_steps(path_t *path, workspace_t *work, const data_t *data, cons
                        int most, int32_t *iterations)
 {
     int k, going = 1, arrived = 0, changed = 1;
-    for (k = 0; k <= BLOCK_STEPS && going; ++k) {
+    for (k = 0; k <= MAX_BLOCK_STEPS && going; ++k) {
         NAME(evaluate)(data, command, work->force, work->lambda, point);
         arrived = is_there(path, work, data, command, point);
-        going = !arrived && changed != 0 && k < most && k < BLOCK_STEPS && GNC_ASSERT(is_finite(point->gap));
-        if (going) {
+        going = !arrived && changed != 0 && k < most && k < MAX_BLOCK_STEPS && GNC_ASSERT(is_finite(point->gap));
+        if (going != 0) {
             changed = block_step(path, work, data, command, point);
             *iterations += 1;
         }
@@ -414,7 +417,6 @@ static int piece(path_t *path, workspace_t *work, const data_t *data, const comm
 int NAME(active_set)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
                      int budget, int32_t *iterations)
 {
-    const int most = budget < MAX_PIECES ? budget : MAX_PIECES; /* a round costs one at least */
     const int was_warm = work->warm;
     int i, v, k, going, arrived = 0;
     real force[N], lambda[V]; /* where the path began */
@@ -425,14 +427,18 @@ int NAME(active_set)(workspace_t *work, const data_t *data, const command_t *com
         arrived = block_steps(&path, work, data, command, point, budget, iterations);
     }
     going = !arrived;
-    for (k = 0; k <= most && going; ++k) {
+    for (k = 0; k <= MAX_PIECES && going; ++k) {
         if (path.exchanges == 0) {
             NAME(evaluate)(data, command, work->force, work->lambda, point);
             arrived = is_there(&path, work, data, command, point);
         }
-        going = !arrived && path.budget > 0 && k < most && GNC_ASSERT(is_finite(point->gap)) &&
-                piece(&path, work, data, command, point);
-        *iterations += going ? 1 : 0;
+        going = !arrived && path.budget > 0 && GNC_ASSERT(is_finite(point->gap));
+        if (going && k < MAX_PIECES && k < budget) { /* a round costs one at least */
+            going = piece(&path, work, data, command, point);
+            *iterations += 1;
+        } else {
+            going = 0; /* the end, by one count or the other */
+        }
     }
     work->smooth = arrived ? path.smooth : 0;
     for (i = 0; i < N && arrived; ++i) { /* remember what this sample's change of the command did */

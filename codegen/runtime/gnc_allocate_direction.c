@@ -8,8 +8,12 @@
  *
  * The linear algebra is that of the interior point with 1/d = 1/q on free and 0 on bounded actuators:
  *
- *     S_free diag(1/q) S_free' = L L',    I + L' W L = C C',    T = C^-1 L'
- *     dy = d0 - T'(T W d0 + J dlambda),   J = T Z,   d0 = S (the step without what y feeds back)
+ *     S_free diag(1/q) S_free' = L L',    I + L' W L = C C',    T = C^-1 L',    J = T Z
+ *     dy = y_b - L C^-T eps,    eps = T W y_b + J dlambda - C^-1 L^-1 y_f
+ *
+ * with y_b what bounded and y_f what free actuators change of y by their own steps, to the bound and to gradient zero
+ * without what y feeds back. These are far larger than dy, so dy is no difference of the two: it would lose the digits
+ * that single precision needs.
  *
  * L depends on the free set alone, T also on lambda, but slowly: both are kept from sample to sample,
  * and most steps need no factorisation larger than that of the vertex weights.
@@ -267,40 +271,51 @@ static void slack_at(goal_t *goal, const data_t *data, const point_t *point, con
     }
 }
 
+/* The steps without what y feeds back, into the goal's forces, and the parts of y that bounded and free actuators make. */
+static void steps_apart(goal_t *goal, real *bounded, real *loose, const workspace_t *work, const data_t *data,
+                        const command_t *command, const point_t *point)
+{
+    int i, k;
+    set_zero(bounded);
+    set_zero(loose);
+    for (i = 0; i < N; ++i) {
+        real *into = loose;
+        real d = -data->inv_curvature[i] * point->g[i];
+        if (work->side[i] != 0) {
+            into = bounded;
+            d = (work->side[i] < 0 ? command->lower[i] : command->upper[i]) - work->force[i];
+        }
+        goal->force[i] = d;
+        UNROLLED
+        for (k = 0; k < K; ++k) {
+            into[k] += data->St[i][k] * d;
+        }
+    }
+}
+
 /* The full step. An empty list of vertices means: hold the vertex weights as they are. */
 int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, const data_t *data,
                       const command_t *command, const point_t *point)
 {
     int i, k, a;
     const int n = vert->count;
-    real fixed[K], free[K], eps[K], dy[K], nu[K], dlambda[A], t, dt;
+    real bounded[K], loose[K], eps[K], dy[K], nu[K], dlambda[A], t, dt;
     if (!GNC_ASSERT(is_within(n, 0, A))) {
         return 0;
     }
     t = n > 0 ? point->q[vert->list[0]] : point->worst;
-    set_zero(fixed);
-    set_zero(free);
-    for (i = 0; i < N; ++i) {
-        const real bound = work->side[i] < 0 ? command->lower[i] : command->upper[i];
-        const real d = work->side[i] != 0 ? bound - work->force[i] : -data->inv_curvature[i] * point->g[i];
-        goal->force[i] = d;
-        real *const into = work->side[i] != 0 ? fixed : free;
-        UNROLLED
-        for (k = 0; k < K; ++k) {
-            into[k] += data->St[i][k] * d;
-        }
-    }
-    forward(work->L, work->inv_L, free);
-    forward(work->C, work->inv_C, free);
-    multiply(work->W, fixed, nu);
+    steps_apart(goal, bounded, loose, work, data, command, point);
+    forward(work->L, work->inv_L, loose);
+    forward(work->C, work->inv_C, loose);
+    multiply(work->W, bounded, nu);
     multiply(work->Tt, nu, eps);
     for (k = 0; k < K; ++k) {
-        eps[k] -= free[k];
+        eps[k] -= loose[k];
     }
-    dt = weigh_vertices(vert, n, point, fixed, eps, dlambda);
+    dt = weigh_vertices(vert, n, point, bounded, eps, dlambda);
     backward(work->C, work->inv_C, eps);
     for (k = 0; k < K; ++k) {
-        dy[k] = fixed[k];
+        dy[k] = bounded[k];
         for (i = 0; i <= k; ++i) {
             dy[k] -= work->L[k][i] * eps[i];
         }

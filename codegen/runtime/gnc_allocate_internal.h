@@ -79,7 +79,7 @@ typedef NAME(result) result_t;
 #define CURVATURE_FLOOR 1e-6F
 #define NO_CURVATURE_FLOOR 1e-4F
 #define CLOSE 1e-4F
-#define CLOSE_REGULARISED 1e-4F
+#define CLOSE_REGULARISED 1e-3F
 #define ADDED_WEIGHT 1e-5F
 #define SPLITTER 4097.0F
 #else

@@ -397,7 +397,8 @@ def gaps_of_floats(problem, u, previous, lower, upper, step, results):
         problem[3] = np.full(len(problem[3]), np.float32(1e-5) * problem[5] * (problem[0] ** 2).sum())
     found = []
     for k, r in enumerate(results):
-        box = effective_box(lower[k] if lower.ndim > 1 else lower, upper[k] if upper.ndim > 1 else upper, previous[k], step)
+        limits = [bound[k] if bound.ndim > 1 else bound for bound in (lower, upper)]
+        box = effective_box(*limits, previous[k], step)
         force = np.clip(np.asarray(r["force"], float), *box)  # a bound of the rate box may be rounded
         gap, f, _ = certificate(problem, u[k], previous[k], *box, force, np.asarray(r["lam"], float))
         found.append(float(gap / f) if f > 0 else 0.0)
