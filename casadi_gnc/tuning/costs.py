@@ -154,7 +154,9 @@ def _unit(term: Term, known: dict[str, Metric]) -> str:
     """Return the unit of a term's value; the metrics of a mission know theirs."""
     assert term.metric is not None
     own = known[term.metric.name].unit
-    return " ".join(filter(None, (own, "s"))) if term.text.startswith("integral(") else own
+    if not term.text.startswith("integral("):
+        return own
+    return own.removesuffix("/s") if own.endswith("/s") else "s" if own in ("", "-") else f"{own} s"
 
 
 def _default(mission: Mission, row: Layout) -> list[str]:
