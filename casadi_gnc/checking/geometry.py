@@ -19,6 +19,8 @@ from casadi_gnc.tables.disturbances import OrbitAndTorque
 _STANDS = 0.01
 #: Angle [rad] beyond which two frames are no longer one frame badly aligned.
 _ALIGNED = 0.2
+#: Share of the true inertia by which the axes of the believed one may be off: products that are not known well.
+_TURNED = 0.05
 #: Largest condition number of the effectiveness that is no nuisance.
 _WELL_CONDITIONED = 100.0
 
@@ -52,9 +54,12 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "Turn the actuators, or fit the limits of the effort to what the actuators make.",
         "condition number of the effectiveness, rows scaled by their limits",
     )
-    for whose, inertia in {"believed": scheme.law.believed_inertia(), **mission.truth.inertias()}.items():
-        if inertia is not None and exact.is_number(inertia):
-            yield triangle(f"geometry.{whose}_inertia", np.array(ca.DM(inertia)))
+    told = {"believed": scheme.law.believed_inertia(), **mission.truth.inertias()}
+    known = {whose: np.array(ca.DM(one)) for whose, one in told.items() if one is not None and exact.is_number(one)}
+    for whose, inertia in known.items():
+        yield triangle(f"geometry.{whose}_inertia", inertia)
+    if "believed" in known and len(known) > 1:
+        yield turned_inertia(known.pop("believed"), list(known.values()))
 
 
 def scale(scheme: Scheme) -> np.ndarray:
@@ -77,6 +82,29 @@ def triangle(name: str, inertia: np.ndarray) -> Check:
         "Correct the inertia.",
         "smallest principal moment, and the two smaller less the largest, over the largest",
         at_least=True,
+    )
+
+
+def turned_inertia(believed: np.ndarray, true: list[np.ndarray]) -> Check:
+    """Return how far a believed inertia, (3, 3), differs by its axes alone from the one, (3, 3), that it is nearest to.
+
+    Of two inertias the principal moments, sorted, differ by no more than the matrices do (Hoffman and Wielandt, 1953,
+    doi:10.1215/S0012-7094-53-02004-3), and by as much where both have the same axes: what is left is what a turn makes.
+    """
+    shares = []
+    for inertia in true:
+        whole = np.linalg.norm(believed - inertia)
+        moments = np.linalg.norm(np.linalg.eigvalsh(believed) - np.linalg.eigvalsh(inertia))
+        shares.append(np.sqrt(max(whole**2 - moments**2, 0.0)) / np.linalg.norm(inertia))
+    return Check(
+        "geometry.believed_turn",
+        float(min(shares)),
+        _TURNED,
+        "-",
+        "warn",
+        "The law believes in principal axes that the craft does not have; its inertia may be in another frame.",
+        "Give the believed inertia in the frame of the measured rate, with its products.",
+        "difference of the inertias that their principal moments do not account for, over the true one",
     )
 
 
