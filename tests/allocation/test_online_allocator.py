@@ -145,7 +145,7 @@ def words_of(compiler, flags, flight):
 @pytest.mark.parametrize(
     ("compiler", "levels"),
     [
-        ("gcc", [oa.FAST_FLAGS]),
+        pytest.param("gcc", [oa.FAST_FLAGS], marks=pytest.mark.slow),
         pytest.param("gcc", [["-O1"], ["-O2"], ["-O3"], ["-O3", "-march=native"]], marks=pytest.mark.slow),
         pytest.param("clang", [["-O0"], ["-O2"], ["-O3", "-march=native"]], marks=pytest.mark.tools("clang")),
     ],

@@ -86,6 +86,7 @@ def test_a_step_that_is_no_expression_is_refused():
         step.contestants(["turbo"])
 
 
+@pytest.mark.slow
 def test_engines_end_where_each_other_does(tmp_path):
     problems = ["huang2020/detumble:observer_pinv", "huang2020/detumble:observer_robust"]
     families = flight.families(problems, 40)

@@ -81,6 +81,7 @@ def test_json_is_the_only_output(problem, tmp_path):
     assert {path.name for path in (tmp_path / "o").iterdir()} == {"damping_pinv.npz", "summary.json", "mission.json"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options", [("--engine", "vm"), ("--math", "libm"), ("--mode", "continuous"), ("--decimation", "10")]
 )

@@ -69,6 +69,7 @@ def test_numbers_of_a_target_reach_the_readme(tmp_path):
     assert 100 < numbers[0] <= numbers[1] <= numbers[2] < 2000  # median, worst of the flight, bound of any
 
 
+@pytest.mark.slow
 def test_words_that_differ_end_with_1(tmp_path):
     folder = copied(made("huang2020/slew", "pd_pinv"), tmp_path)
     source = folder / "slew.c"

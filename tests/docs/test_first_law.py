@@ -8,10 +8,15 @@ from running_pages import ROOT, run, sections
 from casadi_gnc.embedded import boards as targets
 
 PAGE = "first_law.md"
-SECTIONS = [
-    pytest.param(section.title, marks=[pytest.mark.tools(*section.tools)] if section.tools else [])
-    for section in sections(PAGE)
-]
+#: A package is made, replayed and verified by faster tests too.
+SLOW = "Flight C"
+
+
+def marks(section) -> list:
+    return [pytest.mark.tools(*section.tools)] if section.tools else [pytest.mark.slow] if section.title == SLOW else []
+
+
+SECTIONS = [pytest.param(section.title, marks=marks(section)) for section in sections(PAGE)]
 
 
 @pytest.mark.parametrize("section", SECTIONS)

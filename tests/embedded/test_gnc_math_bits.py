@@ -80,6 +80,7 @@ def reference_digests(builds: Builds) -> dict[str, str]:
     return digests(builds("gcc")["gcc-O0"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMPILERS)
 def test_every_build_gives_the_same_bits(builds: Builds, name: str, reference_digests: dict[str, str]):
     for label, library in builds(name).items():

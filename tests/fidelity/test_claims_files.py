@@ -99,6 +99,7 @@ metric = { kind = "peak", signal = "rate" }
     assert "no scheme 'nobody'" in nobody["failure"]
 
 
+@pytest.mark.slow
 def test_a_computation_that_breaks_is_a_row(tmp_path):
     asked = 'computation = { name = "shi2020.slowest_pole", arguments = { mass_ratio = 1e308 } }'
     path = tmp_path / "claims.toml"
@@ -110,6 +111,7 @@ def test_a_computation_that_breaks_is_a_row(tmp_path):
     assert row["failure"].startswith("cannot be computed of these arguments")
 
 
+@pytest.mark.slow
 def test_a_changed_problem_file_is_flown_again(tmp_path):
     """The cache knows a user's own problem file by its content."""
     from casadi_gnc.system import assets

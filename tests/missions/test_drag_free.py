@@ -102,6 +102,7 @@ def sweeps():
 QUICK = [("force", "clipped"), ("torque", "auxiliary")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "scheme"), [case if case in QUICK else pytest.param(*case, marks=pytest.mark.slow) for case in FIRST_LEFT]
 )

@@ -25,6 +25,7 @@ def _no_faults(seeds, folder):
     assert 0 < judged.refused < judged.runs
 
 
+@pytest.mark.slow
 def test_mutants(tmp_path):
     _no_faults(range(QUICK), tmp_path)
 

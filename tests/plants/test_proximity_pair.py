@@ -78,7 +78,7 @@ def test_free_motion_is_that_of_two_bodies(orbit):
     assert max(off.values()) < ROUNDING, off
 
 
-@pytest.mark.parametrize("orbit", ["1e8", "1e6"])
+@pytest.mark.parametrize("orbit", [pytest.param("1e8", marks=pytest.mark.slow), "1e6"])
 def test_closed_loop_is_that_of_two_bodies(orbit):
     """The controller flies the relative equations; the efforts it gave move the two bodies to the same place."""
     plant, bodies = pair(disturbance=OrbitalDisturbance(constant=PUSH)), truth()

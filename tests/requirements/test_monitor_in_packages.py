@@ -157,6 +157,7 @@ def test_the_end_of_a_flight_decides_all_as_the_whole_record_does(tmp_path, monk
         assert verdicts[i] == (1 if truth >= 0 else 2), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("real", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
 def test_a_package_is_made_replayed_and_verified_with_its_monitor(tmp_path, real):
     path = tmp_path / "mine.toml"
@@ -208,6 +209,7 @@ def test_a_board_says_the_same_words(tmp_path):
     assert verify(tmp_path / "package", ("cortex-m7",))["words"] == 0
 
 
+@pytest.mark.slow
 def test_a_mission_of_objects_keeps_its_monitor(tmp_path):
     gnc.generate(mission(FORMULAS), tmp_path / "package", scheme="observer_pinv", name="watched", steps=50)
     assert (tmp_path / "package" / "controller.json").is_file()
