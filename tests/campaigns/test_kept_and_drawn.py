@@ -162,7 +162,7 @@ def test_importance_by_name_weighs_what_it_prefers():
     [
         ("importance", "expected importance:SHIFT:KEY=PART"),
         ("importance:far:truth.inertia_factor", "expected importance:SHIFT:KEY=PART"),
-        ("importance:3:truth.inertia", "'truth.inertia' does not vary; did you mean 'truth.inertia_factor'. There is truth.inertia_factor, initial"),
+        ("importance:3:truth.inertia", "'truth.inertia' does not vary; did you mean 'truth.inertia_factor'. There is"),
         ("importance:3:truth.inertia_factor=x", "expected KEY or KEY=NUMBER"),
         ("importance:9:truth.inertia_factor", "a shift by 9 deviations"),
         ("importance:3:truth.inertia_factor=0", "expected a vector, not zero"),
