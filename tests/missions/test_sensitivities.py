@@ -254,6 +254,17 @@ def exact_forces(problem, command, box, raw):
     return F, tuple(held), tuple(weights)
 
 
+def ties(problem, command, forces, held, vertices):
+    """Return how far the conditions that the worst vertices tie are from one that follows from the others, 0 to 1."""
+    free = [i for i, fixed in enumerate(held) if not fixed]
+    each = [problem.effectiveness + problem.errors[v] @ problem.coupling for v in vertices]
+    gradients = [(B.T @ (B @ forces - command))[free] for B in each]
+    apart = np.array([one - gradients[0] for one in gradients[1:]])
+    if not len(apart):
+        return 1.0
+    return np.linalg.svd(apart / np.linalg.norm(apart, axis=1, keepdims=True), compute_uv=False)[-1]
+
+
 @pytest.mark.slow
 def test_the_allocator_is_differentiated_as_its_optimality_conditions_are():
     """Truth: differences of the solution of the conditions in 30 digits, at many sets of bounds and worst vertices."""
@@ -264,6 +275,7 @@ def test_the_allocator_is_differentiated_as_its_optimality_conditions_are():
     box = [np.clip(np.full(problem.count, side), scheme.actuation.lower, scheme.actuation.upper)
            for side in (-reach, reach)]  # fmt: skip
     rng, sets, none = np.random.default_rng(5), set(), np.zeros(problem.count)
+    compared = 0
     for _ in range(40):
         p = varied.parameters.nominal.copy()
         p[:3] = rng.standard_normal(3) * 10 ** rng.uniform(-4, -1)
@@ -284,10 +296,14 @@ def test_the_allocator_is_differentiated_as_its_optimality_conditions_are():
             )
         except ZeroDivisionError:  # more worst vertices than the weights can be told of
             continue
+        if ties(problem, np.array(limited), np.array([float(force) for force in ahead]), *known) < 1e-6:
+            continue  # one tie follows from the others, and which of their weights changes is anybody's choice
         sets.add(tuple(known))
+        compared += 1
         truth = np.array([float((a - b) / (2 * step)) for a, b in zip(ahead, behind, strict=True)])
         np.testing.assert_allclose(slopes, truth, rtol=1e-6, atol=1e-7 * np.abs(truth).max())
     assert len(sets) >= 5
+    assert compared >= 30
 
 
 KEYS = ["initial.rate_rad_per_s", "scheme.observer_pinv.law.rate_gain"]

@@ -106,7 +106,7 @@ def without_allocation(real: str, folder, steps: int = 300):
 @pytest.mark.parametrize(
     ("real", "name", "instructions", "text"),
     [
-        pytest.param("float", "cortex-m4f", 1500, 6 * 1024, marks=needs_target("cortex-m4f")),
+        pytest.param("float", "cortex-m4f", 1500, 6400, marks=needs_target("cortex-m4f")),
         pytest.param("double", "cortex-m7", 1700, None, marks=needs_target("cortex-m7")),
     ],
 )
