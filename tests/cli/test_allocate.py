@@ -113,6 +113,7 @@ def test_each_answer_is_flushed():
         assert "3 OPTIMAL" in peer.stderr.read()
 
 
+@pytest.mark.slow
 def test_reader_that_leaves_and_ctrl_c_end_cleanly():
     given = "1e-4,0,0\n" * 5000
     pipe = f"{' '.join(PROGRAM)} {CASE} --stream | head -n 2"

@@ -151,6 +151,7 @@ def test_bad_input_is_one_sentence_and_exit_2(problem, tmp_path):
     assert run("fly", str(problem), "--wings").returncode == 2
 
 
+@pytest.mark.slow
 def test_interrupted_flight_leaves_no_half_file(tmp_path):
     run("problems", "copy", "huang2020/detumble", str(tmp_path))
     slow = (

@@ -121,6 +121,7 @@ def test_printed_theorem_is_infeasible_and_named(backend):
     assert next(iter(found["multipliers"])) == "(26) input"  # carries most of the proof
 
 
+@pytest.mark.slow
 def test_text_names_gains_and_constraints():
     done = run("shi2020/synthesis")
     assert "K =" in done.stdout

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 
+@pytest.mark.slow
 def test_the_snippet_of_the_page_runs(tmp_path, monkeypatch):
     text = (Path(__file__).parents[2] / "docs" / "functions.md").read_text(encoding="utf-8")
     *lines, last = text.split("```python\n")[1].split("```")[0].strip().splitlines()

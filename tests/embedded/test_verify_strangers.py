@@ -105,6 +105,7 @@ def made_of(folder, problem):
     return text
 
 
+@pytest.mark.slow
 def test_vectors_that_show_nothing(folder):
     """True words of the true C, but of measurements at rest, under which a changed gain would not be seen."""
     inputs, _ = read_vectors(folder, "float64")
@@ -166,6 +167,7 @@ def test_files_that_no_package_has(name, is_listed, folder, tmp_path):
     assert not trace.exists()
 
 
+@pytest.mark.slow
 def test_notes_of_a_user_are_told_and_no_fault(folder):
     (folder / "notes.txt").write_text("mine")
     told = verify(folder)

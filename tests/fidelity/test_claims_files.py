@@ -81,6 +81,7 @@ def test_a_changed_printed_number_flips_its_verdict(tmp_path):
     assert json.loads(told.stdout)["papers"][0]["claims"][0]["verdict"] == "not reproduced"
 
 
+@pytest.mark.slow
 def test_what_cannot_be_flown_is_a_row_and_the_rest_goes_on(tmp_path):
     broken = """
 [[claim]]

@@ -117,6 +117,7 @@ def test_statics_of_the_printed_fault():
     assert huang2019.static_attitude("huang2019/nominal") == pytest.approx(0.195 / 7, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_every_corner_is_counted():
     """Without faults each of the eight flights settles; none does below zero."""
     assert huang2019.corners_lost("huang2019/fault_free", "observers_pinv", 0.65, 0.3) == 0

@@ -404,6 +404,7 @@ def test_command_finds_the_slew_as_printed_and_draws(tmp_path):
         assert found["funnel_pinv", f"gains.theorem1.{theorem}"]["verdict"] == "note"
 
 
+@pytest.mark.slow
 def test_command_keeps_names_and_numbers_whole_in_80_columns():
     told = command("sun2018/circular_orbit", columns="80")
     assert told.returncode == 0

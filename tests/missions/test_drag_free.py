@@ -50,6 +50,7 @@ def test_mean_error_does_not_depend_on_the_step(problem, scheme):
     assert means[0] == pytest.approx(means[1], rel=0.01)
 
 
+@pytest.mark.slow
 def test_funnels_are_kept_only_with_prescribed_performance(case1):
     """Simulated independently: use 0.72 and 0.65; without, sigma leaves in the transient already."""
     kept = casadi_gnc.fly(case1, "funnels")

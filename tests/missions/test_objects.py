@@ -101,6 +101,7 @@ def test_a_scheme_takes_another_law():
         mission.with_scheme(attitude_gian=0.8)
 
 
+@pytest.mark.slow
 def test_changes_of_a_loaded_mission_are_paths_of_its_file(tmp_path):
     """So that a package can keep the file and say what was changed."""
     loaded = gnc.load("huang2020/detumble")

@@ -105,6 +105,7 @@ def judged(formula, signals):
     return min(values, default=math.inf) if kind == "always" else max(values, default=-math.inf)
 
 
+@pytest.mark.slow
 def test_a_monitor_judges_each_instant_once_its_intervals_have_passed():
     """Windows that reach past the sample at hand are not judged yet; those that were are as the definition says."""
     rng, watched = np.random.default_rng(4), 0

@@ -25,6 +25,7 @@ def test_clang_tidy_finds_nothing(tmp_path: Path):
     compilers.tidy(tmp_path)
 
 
+@pytest.mark.slow
 def test_gcc_analyzer_finds_nothing(tmp_path: Path):
     compilers.analyzer(tmp_path)
 
@@ -38,6 +39,7 @@ def test_every_branch_is_taken(tmp_path: Path):
     branch_coverage.gate(tmp_path)
 
 
+@pytest.mark.slow
 def test_chosen_cases_under_sanitizers(tmp_path: Path):
     assert "0 failures" in fuzzing.chosen(tmp_path, (4, 3, 1, 2, "double"))
 

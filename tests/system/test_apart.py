@@ -124,6 +124,7 @@ def test_an_old_answer_is_not_taken_for_a_new_one(call):
         call("leave")
 
 
+@pytest.mark.slow
 def test_what_does_not_end_is_ended(call, tmp_path):
     since = time.monotonic()
     with pytest.raises(apart.ApartError, match="did not end within 4 s"):

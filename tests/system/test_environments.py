@@ -91,6 +91,7 @@ def test_no_home_and_an_unknown_user(place):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_a_home_that_is_not_there(place):
     assert run(place, ALLOCATE, HOME="/nonexistent").stdout == answer()
 

@@ -103,6 +103,7 @@ for k in range(10**6):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux is sure to exchange names at one moment")
 def test_a_kill_at_any_moment_leaves_one_whole_folder(tmp_path):
     folder = written(tmp_path / "package", {"a": "-", "b": "-", "last": "-", "mine": "mine"})
