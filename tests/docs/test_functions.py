@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 
 @pytest.mark.slow
 def test_the_snippet_of_the_page_runs(tmp_path, monkeypatch):
