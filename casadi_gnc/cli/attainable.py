@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import tell
+from casadi_gnc.cli.manners import print_json, tell
 from casadi_gnc.cli.progress import working
 
 
@@ -37,9 +37,7 @@ def attainable(
     with working("measuring attainable sets"):
         found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed, units=case.units)
     if json:
-        import json as encoder
-
-        typer.echo(encoder.dumps({"problem": case.name, **found.summary()}, indent=2))
+        print_json({"problem": case.name, **found.summary()})
     else:
         typer.echo(case.title or case.name)
         for sentence in found.sentences():

@@ -8,6 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from casadi_gnc.cli.manners import print_json
+from casadi_gnc.cli.progress import Progress
+
 if TYPE_CHECKING:
     from casadi_gnc.benchmarks.results import Results
     from casadi_gnc.benchmarks.summary import Overview
@@ -150,9 +153,7 @@ def compare(
         _tell_corrupt(run)
     found = comparing.compare(*runs)
     if json:
-        import json as encoder
-
-        typer.echo(encoder.dumps([asdict(one) for one in found], indent=2))
+        print_json([asdict(one) for one in found])
         return
     for run in runs:
         typer.echo(comparing.conditions(run))
@@ -169,7 +170,7 @@ def _run(
 
     chosen = None if named is None else [part.strip() for part in named.split(",") if part.strip()]
     folder = Path("out") / "bench" / name if out is None else out
-    with _Bar(quiet=as_json) as progress:
+    with Progress(name, quiet=as_json) as progress:
         results = run(
             name, problems or [], folder, contestants=chosen, settings=Settings(**settings), progress=progress
         )
@@ -224,33 +225,3 @@ def _print(found: Overview) -> None:
             console.print(f"steps per second: {', '.join(rates)}", highlight=False)
         for names in alike(order):
             console.print(f"do not differ beyond doubt, each from its neighbour: {', '.join(names)}", highlight=False)
-
-
-class _Bar:
-    """Show how far a run has come; on a terminal only."""
-
-    def __init__(self, *, quiet: bool) -> None:
-        import sys
-
-        self._shown = not quiet and sys.stderr.isatty()
-        self._bar: Any = None
-        self._task: Any = None
-
-    def __enter__(self) -> Any:
-        return self._update
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def _update(self, done: int, total: int, what: str) -> None:
-        if not self._shown:
-            return
-        if self._bar is None:
-            from rich.console import Console
-            from rich.progress import Progress
-
-            self._bar = Progress(console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task("", total=total)
-        self._bar.update(self._task, completed=done, description=what)

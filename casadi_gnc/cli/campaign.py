@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from enum import Enum
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +10,7 @@ import typer
 
 from casadi_gnc.cli import completing
 from casadi_gnc.cli.campaign_summary import print_summary
-from casadi_gnc.cli.manners import tell
+from casadi_gnc.cli.manners import print_json, tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -129,7 +128,7 @@ def _tell(
     if not json:
         print_summary(made, confidence)
     else:
-        typer.echo(dumps(made.summary(confidence), indent=2, allow_nan=False))
+        print_json(made.summary(confidence))
     if pictures is not None:
         from casadi_gnc.reports.campaign_gallery import draw_campaign
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import print_json
 
 _PROBLEM = typer.Argument(
     autocompletion=completing.problems, help="A mission file: what it names of your own is listed too."
@@ -27,7 +28,7 @@ def laws(
     found = [catalogue.law_data(law, samples) for law in catalogue.laws(problem)]
     found = _chosen(found, show, "law")
     if json:
-        _print_json({"laws": found})
+        print_json({"laws": found})
         return
     for law in found:
         _heading(law)
@@ -57,7 +58,7 @@ def crafts(
         found.append(catalogue.craft_data(craft, sample, fitting))
     found = _chosen(found, show, "craft")
     if json:
-        _print_json({"crafts": found})
+        print_json({"crafts": found})
         return
     for craft in found:
         _heading(craft)
@@ -113,9 +114,3 @@ def _table(columns: list[str], rows: list[list[str]]) -> None:
     widths = [max(len(row[i]) for row in [columns, *rows]) for i in range(len(columns))]
     for row in [columns, *rows]:
         typer.echo("    " + "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip())
-
-
-def _print_json(content: dict[str, Any]) -> None:
-    import json
-
-    typer.echo(json.dumps(content, indent=2, default=str))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import print_json
 from casadi_gnc.cli.progress import working
 
 if TYPE_CHECKING:
@@ -79,11 +80,9 @@ def _checked(problem: str, schemes: list[str] | None) -> Checked:
 
 
 def _print_json(title: str, found: list[Check]) -> None:
-    import json as encoder
-
     from casadi_gnc.checking import as_data
 
-    typer.echo(encoder.dumps({"problem": title, "checks": as_data(found)}, indent=2, allow_nan=False))
+    print_json({"problem": title, "checks": as_data(found)})
 
 
 def _sections(found: list[Check]) -> list[tuple[str, list[Check]]]:

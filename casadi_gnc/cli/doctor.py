@@ -6,6 +6,8 @@ from typing import Annotated, Any
 
 import typer
 
+from casadi_gnc.cli.manners import print_json
+
 #: Packages of the core, then of extras: package, module to look for, extra, what it gives.
 _CORE = ("casadi", "numpy", "scipy", "proxsuite", "qpsolvers", "matplotlib", "clarabel", "daqp", "pydantic", "typer")
 _EXTRAS = (
@@ -21,9 +23,7 @@ def doctor(json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] 
     """Print versions, compilers, solvers, the cache folder, what is missing and what that costs."""
     report = examine()
     if json:
-        import json as encoder
-
-        typer.echo(encoder.dumps(report, indent=2))
+        print_json(report)
         return
     typer.echo(f"casadi-gnc {report['casadi_gnc']}, Python {report['python']}, {report['platform']}")
     typer.echo("packages   " + ", ".join(f"{name} {version}" for name, version in report["packages"].items()))

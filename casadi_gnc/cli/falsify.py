@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import tell
+from casadi_gnc.cli.manners import print_json, tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -58,8 +58,6 @@ def falsify(
     The break is written as a problem file that flies like any other. Ctrl-C or a kill lose nothing that was flown: the
     same command goes on.
     """
-    import json as encoder
-
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.tuning.falsifying import falsify as look
 
@@ -80,7 +78,7 @@ def falsify(
             told=told,
         )
     if json:
-        typer.echo(encoder.dumps(found.as_data(), indent=2, allow_nan=False))
+        print_json(found.as_data())
     else:
         _print(found)
     if found.known:

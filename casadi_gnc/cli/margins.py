@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import print_json
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -97,7 +98,6 @@ def _or_any(value: float) -> str:
 
 def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> None:
     import dataclasses
-    import json as encoder
 
     def number(value: float) -> float | None:
         return value if math.isfinite(value) else None
@@ -117,4 +117,4 @@ def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> N
         }
 
     content = {"problem": title, "schemes": [data(one) for one in found], "notes": lacking}
-    typer.echo(encoder.dumps(content, indent=2, allow_nan=False))
+    print_json(content)

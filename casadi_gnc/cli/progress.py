@@ -28,7 +28,7 @@ def silenced() -> Iterator[None]:
 
 
 class Progress:
-    """Show how far something is, on stderr; entering gives the function (done, all) that is told.
+    """Show how far something is, on stderr; entering gives the function (done, all, what is done now) that is told.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def _update(self, done: int, total: int) -> None:
+    def _update(self, done: int, total: int, what: str | None = None) -> None:
         if self._quiet or (self._bar is None and time.monotonic() - self._since < 1.0):
             return
         if self._bar is None:
@@ -61,7 +61,7 @@ class Progress:
             self._bar = Bar(console=console, transient=True)  # with the time left, by default
             self._bar.start()
             self._task = self._bar.add_task(self._name, total=total)
-        self._bar.update(self._task, completed=done)  # type: ignore[arg-type]
+        self._bar.update(self._task, completed=done, description=what or self._name)  # type: ignore[arg-type]
 
 
 @contextlib.contextmanager

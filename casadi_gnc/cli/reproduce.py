@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from casadi_gnc.cli.manners import print_json
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -36,11 +37,9 @@ def reproduce(
         reports.append(fidelity.PaperReport(Path(name).stem if name.endswith(".toml") else name, file, answers))
     written = _write(out, reports) if out is not None else []
     if json:
-        import json as encoder
-
         from casadi_gnc.fidelity.report import as_data
 
-        typer.echo(encoder.dumps(as_data(reports), indent=2, allow_nan=False))
+        print_json(as_data(reports))
     else:
         for report in reports:
             _print(report)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
 
 from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import print_json
 
 
 def schema(
@@ -33,7 +33,7 @@ def schema(
 
         if problem is not None:
             raise ProblemError("give a problem file or --output, not both")
-        typer.echo(json.dumps(outputs.schema(output), indent=2))
+        print_json(outputs.schema(output))
         return
     found = json_schema.every_kind(BenchmarkModel, ClaimsFile) if problem is None else json_schema.of_file(problem)
-    typer.echo(json.dumps(found, indent=2))
+    print_json(found)

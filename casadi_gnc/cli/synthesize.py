@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import tell
+from casadi_gnc.cli.manners import print_json, tell
 
 if TYPE_CHECKING:
     from casadi_gnc.problem_files.synthesis_file import SynthesisCase
@@ -56,9 +56,7 @@ def synthesize(
         found = out_of_time(case, backend, time_limit)
     written = "" if target is None or not found["certified"] else _written(target, case, found)
     if json:
-        import json as encoder
-
-        typer.echo(encoder.dumps(found, indent=2))
+        print_json(found)
     else:
         _print(case.title or case.name, found)
         if written:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import tell
+from casadi_gnc.cli.manners import print_json, tell
 
 if TYPE_CHECKING:
     from casadi_gnc.tuning.outcome import Moved, Tuned
@@ -87,9 +87,7 @@ def tune(
 
         of_tuning(found.data(), load(problem, strict=False), load(out, strict=False), report)
     if json:
-        import json as encoder
-
-        typer.echo(encoder.dumps(found.data(), indent=2, allow_nan=False))
+        print_json(found.data())
     else:
         _print(found)
         typer.echo("\n".join(f"wrote {path}" for path in (out, report) if path is not None))

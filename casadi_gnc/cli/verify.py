@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import print_json
 from casadi_gnc.cli.progress import working
 
 
@@ -42,9 +43,7 @@ def verify(
 
         of_verification(found, report)
     if json:
-        import json as encoder
-
-        typer.echo(encoder.dumps(found, indent=2, allow_nan=False))
+        print_json(found)
     else:
         _print(found)
         if report is not None:
