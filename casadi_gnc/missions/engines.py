@@ -94,11 +94,30 @@ def build_options(scheme: Scheme, maths: Math, optimise: str = "-O2") -> tuple[t
     return (optimise, *own), ()
 
 
+def flight_facts(mission: Mission, scheme: Scheme) -> dict[str, Any]:
+    """Return what the C of a flight is told of a mission and a scheme, whatever it does with them."""
+    plant, timing = mission.truth, mission.timing
+    return {
+        "title": f"{mission.name}, scheme {scheme.name}",
+        "mode": timing.mode,
+        "substeps": timing.substeps,
+        "period": c_constant(timing.sample_period),
+        "states": plant.state.size,
+        "measurements": plant.measurement.size,
+        "memory": scheme.flown.memory.size,
+        "efforts": scheme.actuation.effort.size,
+        "actuators": plant.inputs.size,
+        "noise": plant.noise.size,
+        "noise_every": mission.noise.every,
+        "uniforms": uniform_count(plant.noise.size),
+    }
+
+
 def flight_source(
     mission: Mission, scheme: Scheme, tapes: Tapes, maths: Math = "gnc", *, side_by_side: bool = False
 ) -> str:
     """Return the C of whole flights: every tape and the loop over them; side by side, LANES at once (-DLANES=4)."""
-    plant, timing, fused = mission.truth, mission.timing, "stage" in tapes.functions
+    fused = "stage" in tapes.functions
     configure = tapes.functions.get("configure")
     unused = ("before", "allocate") if fused else ("plant",)
 
@@ -107,27 +126,16 @@ def flight_source(
         return call(tapes.functions[name], _places(sample) | places)
 
     return template("flight.c.j2").render(
-        title=f"{mission.name}, scheme {scheme.name}",
-        mode=timing.mode,
+        **flight_facts(mission, scheme),
         side_by_side=side_by_side,
         maths=maths,
         real="double",
-        states=plant.state.size,
-        measurements=plant.measurement.size,
-        memory=scheme.flown.memory.size,
-        efforts=scheme.actuation.effort.size,
-        actuators=plant.inputs.size,
-        noise=plant.noise.size,
-        noise_every=mission.noise.every,
-        uniforms=uniform_count(plant.noise.size),
         report=scheme.actuation.allocator.report.size,
         row=tapes.row.size,
         tally=tapes.tally.size,
         batch=configure is not None,
         parameters=configure.numel_in("p") if configure is not None else 0,
         derived=configure.numel_out("derived") if configure is not None else 0,
-        substeps=timing.substeps,
-        period=c_constant(timing.sample_period),
         symbolic=tapes.symbolic,
         modulated="modulate" in tapes.functions,
         online=isinstance(scheme.actuation.allocator, OnlineInFlight),

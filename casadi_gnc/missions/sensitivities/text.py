@@ -8,10 +8,10 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.allocation import OnlineInFlight
-from casadi_gnc.embedded.printer import c_constant, print_function
+from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.linearised import Linearised, linearised
-from casadi_gnc.mathematics.noise import uniform_count
+from casadi_gnc.missions.engines import flight_facts
 from casadi_gnc.missions.parameters import Varied
 from casadi_gnc.system.templates import template
 
@@ -67,7 +67,7 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
         For an allocation called from Python, and for pulses.
     """
     mission, scheme, tapes = varied.mission, varied.scheme, varied.tapes
-    plant, timing, allocator = mission.truth, mission.timing, scheme.actuation.allocator
+    allocator = scheme.actuation.allocator
     online = isinstance(allocator, OnlineInFlight)
     if not tapes.symbolic and not online:
         raise FlightError(
@@ -83,7 +83,7 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
     control = ["stage"] if "stage" in functions else ["sense", "before", "allocate"]
     control += ["flow"] if "flow" in functions else []
     whole = [*(name for name in control if name in functions), "ask", "settle", "configure", "sense", "start"]
-    whole += ["after", "rate"] if timing.mode == "sampled" else []
+    whole += ["after", "rate"] if mission.timing.mode == "sampled" else []
     whole = list(dict.fromkeys(whole))
     made = {name: linearised(functions[name], STILL) for name in whole}
     plain = [*(name for name in whole if name not in ("configure", "start")), "point", "weigh", "join"]
@@ -96,22 +96,11 @@ def sensitivities_source(varied: Varied, asked: ca.Function) -> str:
         texts.append(print_function(each.forward, shared=("partials",)))
         texts.append(print_function(each.reverse))
     return template("sensitivities.c.j2").render(
-        title=f"{mission.name}, scheme {scheme.name}",
-        mode=timing.mode,
+        **flight_facts(mission, scheme),
         online=online,
-        states=plant.state.size,
-        measurements=plant.measurement.size,
-        memory=scheme.flown.memory.size,
-        efforts=scheme.actuation.effort.size,
-        actuators=plant.inputs.size,
-        noise=plant.noise.size,
-        noise_every=mission.noise.every,
-        uniforms=uniform_count(plant.noise.size),
         parameters=varied.parameters.size,
         derived=functions["configure"].numel_out("derived"),
         asked=asked.numel_out(0),
-        substeps=timing.substeps,
-        period=c_constant(timing.sample_period),
         control=control,
         tapes=texts,
         partials={name: each.partials for name, each in made.items()},
