@@ -17,6 +17,7 @@ from pathlib import Path
 
 import casadi as ca
 import numpy as np
+from processor_time import shortest
 
 import casadi_gnc
 from casadi_gnc.missions import tapes
@@ -29,16 +30,6 @@ oracle = import_module("detumble_numpy")
 
 MISSION, SCHEME = casadi_gnc.load("huang2020/detumble"), "observer_pinv"
 SAMPLES = MISSION.timing.samples
-
-
-def shortest(run: Callable[[], object], times: int) -> float:
-    """Return the least processor time of several runs [s]: other work on the machine must not favour short ones."""
-    spent = []
-    for _ in range(times):
-        start = time.process_time()
-        run()
-        spent.append(time.process_time() - start)
-    return min(spent)
 
 
 def compiled(maths: str) -> Callable[[], np.ndarray]:

@@ -7,11 +7,10 @@ more than 1 + p flights (p of 4 and more), or an adjoint more than 6; `--json FI
 
 import argparse
 import json
-import time
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from processor_time import shortest
 
 import casadi_gnc
 from casadi_gnc.campaigns.engines import CompiledBatch
@@ -27,16 +26,6 @@ FLIGHTS = (
 PARAMETERS = (1, 4, 8, 32)
 
 
-def least(run: Callable[[], object], times: int = 7) -> float:
-    """Return the least processor time of several runs, [s]."""
-    spent = []
-    for _ in range(times):
-        start = time.process_time()
-        run()
-        spent.append(time.process_time() - start)
-    return min(spent)
-
-
 def measured(name: str, scheme: str, asked: str, seconds: float) -> dict[str, float]:
     """Return what tangents and an adjoint cost, in flights."""
     mission = casadi_gnc.load(name, strict=False).with_timing(duration=seconds)
@@ -46,17 +35,17 @@ def measured(name: str, scheme: str, asked: str, seconds: float) -> dict[str, fl
     slopes = casadi_gnc.sensitivities(mission, keys, Requirement("END", formula=f"always({asked})"), scheme)
     p, seed = slopes.varied.parameters.nominal, mission.noise.seed
     batch = CompiledBatch(slopes.varied, vectors="none", threads=1)
-    flight = least(lambda: batch.fly(p[None, :], np.array([seed])))
+    flight = shortest(lambda: batch.fly(p[None, :], np.array([seed])))
     engine = slopes._engine
     flown = engine.values(p, seed)
     weights = slopes._outcome.weigh(flown.asked, 1e-3).weights
-    first = least(lambda: engine.values(p, seed)) / flight
+    first = shortest(lambda: engine.values(p, seed)) / flight
     found = {
         f"tangents of {count}": first
-        + least(lambda n=count: engine.tangents(p, seed, weights, np.ones((n, len(p))))) / flight
+        + shortest(lambda n=count: engine.tangents(p, seed, weights, np.ones((n, len(p))))) / flight
         for count in PARAMETERS
     }
-    return {**found, "adjoint": first + least(lambda: engine.adjoint(p, seed, weights, flown)) / flight}
+    return {**found, "adjoint": first + shortest(lambda: engine.adjoint(p, seed, weights, flown)) / flight}
 
 
 def main() -> None:
