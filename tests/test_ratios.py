@@ -51,8 +51,9 @@ SCRIPTS = [
 
 
 @pytest.mark.parametrize("script", SCRIPTS)
-def test_what_measures_can_be_loaded(script):
+def test_what_measures_can_be_loaded(script, monkeypatch):
     """Scripts that run for minutes find what they import, and read what they measure."""
+    monkeypatch.syspath_prepend(script.parent)  # as Python does for a script
     spec = importlib.util.spec_from_file_location(f"bench_{script.stem}", script)
     assert spec
     assert spec.loader
