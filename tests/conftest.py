@@ -14,8 +14,8 @@ import pytest
 import casadi_gnc
 from casadi_gnc.system.compilers import Compiler, _probe
 
-# Independent implementations that tests and benchmarks compare with.
-sys.path.insert(0, str(Path(__file__).parent / "oracles"))
+# Independent implementations that tests and benchmarks compare with, and what measures, which imports its neighbours.
+sys.path[:0] = [str(Path(__file__).parent / folder) for folder in ("oracles", "bench")]
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
