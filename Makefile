@@ -64,6 +64,7 @@ pictures: .venv/installed
 	$(BIN)/casadi-gnc attainable problems/huang2020/allocation.toml --plot docs/images/attainable.png
 	cp $(OUT)/slew/funnel_robust.png docs/images/slew.png
 	$(BIN)/python docs/moving_picture.py docs/images/slew.gif
+	$(BIN)/python docs/theory_pictures.py docs/images
 	$(BIN)/casadi-gnc fly problems/shi2020/docking.toml --scheme iobc --out $(OUT)/docking
 	cp $(OUT)/docking/iobc.png docs/images/docking.png
 	$(BIN)/casadi-gnc fly problems/huang2019/vertices.toml --out $(OUT)/vertices
