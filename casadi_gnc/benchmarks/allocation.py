@@ -32,6 +32,11 @@ RESIDUALS = (
     "largest violation of a bound, over the actuator's reach",
     "duality gap over cost after moving the forces into their bounds, 0 at the rounding floor",
 )
+MISSED = (
+    "effort not made, |u - (A + D_v E) F| under the worst error, over the largest effort of the actuators, of the "
+    "forces moved into their bounds; median and largest over samples. It does not decide: the cost weighs it against "
+    "effort"
+)
 LIMITATIONS = (
     "Back ends are called from Python, as `Allocator` calls them: for those of a few microseconds most of the "
     "time is the call. Only back ends that report a time of their own can be told apart from it; the on-board "
@@ -123,6 +128,11 @@ def able(contestant: str, family: Family) -> bool:
     return Capability.ROBUST in _module(contestant).CAPABILITIES or not family.data.problem.is_robust
 
 
+def objective_of(contestant: str) -> str:
+    """Return what a back end minimises in the place of the problem's cost; empty where it is that cost."""
+    return str(getattr(_module(contestant), "OBJECTIVE", ""))
+
+
 def versions(contestant: str) -> dict[str, str]:
     """Return the versions of the packages behind a back end."""
     if ".py" in contestant:
@@ -180,4 +190,6 @@ class AllocationRunner:
         cost, gap, _, status = certify(problem, command, previous, inside, said.weights, accuracy, (lower, upper))
         good = status.is_certified and violation <= BOUNDS[self._accuracy]
         relative = 0.0 if status.name == "AT_ROUNDING" else max(gap, 0.0) / cost if cost > 0 else float(gap > 0)
-        return Judgement(bool(said.claimed), good, violation, relative, said.seconds, said.iterations)
+        missing = float(np.linalg.norm(problem.missing(inside, command), axis=1).max())
+        missed = missing / problem.full_effort if problem.full_effort > 0 else np.nan
+        return Judgement(bool(said.claimed), good, violation, relative, said.seconds, said.iterations, missed)

@@ -25,6 +25,7 @@ class Judgement:
     violation, gap : the two residuals; what they are relative to is the contest's to say. Infinite
         where there is no answer.
     own_seconds : the time that the contestant itself reports; NaN if it reports none.
+    missed : a measure that decides nothing, `MISSED` of the contest says which; NaN if there is none.
     iterations : its count.
     """
 
@@ -34,6 +35,7 @@ class Judgement:
     gap: float
     own_seconds: float = float("nan")
     iterations: int = 0
+    missed: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +80,8 @@ class Contest(Protocol):
     """A module of this room, found by `contest`.
 
     A contest may also have `appendix(families)`, a text in Markdown that is made once a run and stands
-    in the report.
+    in the report; `MISSED`, what its judgements' `missed` is; and `objective_of(contestant)`, what one minimises in the
+    place of what the others do.
 
     Attributes
     ----------

@@ -124,4 +124,5 @@ def _cell(
         started=started,
         memory_MB=outcome.memory_MB,
         failures=failures,
+        missed=[one.missed if one else math.nan for one in judged],
     )

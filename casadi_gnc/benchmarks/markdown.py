@@ -41,7 +41,7 @@ def as_markdown(found: Overview, pictures: list[Path]) -> str:
             f"## {group}",
             "\n".join(f"* `{name}`: {markdown(header['families'][name]['title'])}" for name in names),
         ]
-        parts += [ranking_table(order, found.whole(group)), _differences(order)]
+        parts += [ranking_table(order, found.whole(group)), *_others(header, order), _differences(order)]
         if header["contest"] == "flight":
             parts.append(_rates(found.whole(group)))
         parts += [f"![{group}]({path.name})" for path in pictures if path.stem == group]
@@ -52,6 +52,8 @@ def as_markdown(found: Overview, pictures: list[Path]) -> str:
     parts += ["## What the columns mean", "\n".join(f"* **{name}**: {text}." for name, text in MEANINGS.items())]
     residuals = header["residuals"]
     parts.append(f"Residuals: the first is the {residuals[0]}; the second the {residuals[1]}. The largest are shown.")
+    if header.get("missed"):
+        parts.append(f"Missed: {header['missed']}.")
     parts += ["## Known limitations", "\n".join(f"* {text}" for text in [*header["limitations"], *_common(header)])]
     failures = lost(list(results.cells.values()))
     if failures:
@@ -122,7 +124,9 @@ def ranking_table(order: list[tuple[str, Ratio | None]], rows: dict[str, dict[st
         "solver + wrapper",
         "mean",
     )
-    lines = ["Times in microseconds.\n", _line([*heads, "residuals"]), _line(["---"] + ["---:"] * (len(heads)))]
+    is_missed = any(row.get("missed") is not None for row in rows.values())
+    heads = (*heads, "residuals", *(["missed"] if is_missed else []))
+    lines = ["Times in microseconds.\n", _line([*heads]), _line(["---"] + ["---:"] * (len(heads) - 1))]
     for who, _ in order:
         row = rows[who]
         own = "not reported"
@@ -138,9 +142,22 @@ def ranking_table(order: list[tuple[str, Ratio | None]], rows: dict[str, dict[st
             own,
             shown(row["mean_us"]),
             residuals,
+            *([missed(row)] if is_missed else []),
         ]
         lines.append(_line(cells))
     return "\n".join(lines)
+
+
+def missed(row: dict[str, Any]) -> str:
+    """Return the median and the largest of what was missed; a dash where nothing is known."""
+    return "-" if row.get("missed") is None else f"{row['missed']:.0e}, {row['missed_max']:.0e}"
+
+
+def _others(header: dict[str, Any], order: list[tuple[str, Ratio | None]]) -> list[str]:
+    """Return a paragraph on those of a set that minimise something else."""
+    told = header.get("objectives", {})
+    lines = [f"* `{who}`: {markdown(told[who])}." for who, _ in order if who in told]
+    return ["\n".join(["**These minimise another objective**, and are judged by ours:", "", *lines])] if lines else []
 
 
 def _rates(rows: dict[str, dict[str, Any]]) -> str:

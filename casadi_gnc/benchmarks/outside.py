@@ -11,7 +11,8 @@ name (`NAME.csv`)         content
 B                         effectiveness, (R, N)
 v                         commands, (R, K) or (K, R); where R = K a column is a command
 plim                      lower and upper position of each actuator, (N, 2)
-rlim, T                   lower and upper rate [1/s], (N, 2), and sample period [s]; or neither
+rlim, T                   lower and upper rate [1/s], (N, 2), and sample period [s]; or neither. Without T its first
+                          period T1 is taken, which the F-18's file has
 u                         positions before each sample, (N, K) or (K, N); see above without
 wu, gamma                 weights of the positions, (N,), 1, and of the effort error, 1e6
 ========================  ==================================================================
@@ -32,7 +33,7 @@ from casadi_gnc.errors import AllocationError, BenchmarkError, ProblemError
 from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.system import csv_file
 
-_NAMES = ("B", "v", "plim", "rlim", "T", "u", "wu", "gamma")
+_NAMES = ("B", "v", "plim", "rlim", "T", "T1", "u", "wu", "gamma")
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +86,9 @@ def read_commands(path: Path, problem: AllocationProblem) -> Samples:
 def read_outside(path: Path) -> Samples:
     """Return the samples of a `.mat` file or a folder of CSV files; raise `BenchmarkError` naming the defect."""
     given = _folder(path) if path.is_dir() else _mat(path)
+    first = given.pop("T1", None)
+    if first is not None and "rlim" in given:
+        given.setdefault("T", first)
     for name in ("B", "v", "plim"):
         if name not in given:
             raise BenchmarkError(f"{path} lacks {name}; it has {', '.join(given) or 'none of the known names'}")

@@ -37,6 +37,7 @@ class Cell:
     started : seconds since the run began, when the cell was measured.
     memory_MB : largest size of the contestant's process until then.
     failures : by sample number, how it failed to answer.
+    missed : of each sample, the measure that decides nothing; empty where the contest has none.
     """
 
     contestant: str
@@ -57,6 +58,7 @@ class Cell:
     started: float = 0.0
     memory_MB: float = math.nan
     failures: dict[str, str] = field(default_factory=dict)
+    missed: list[float] = field(default_factory=list)
 
     @property
     def key(self) -> tuple[str, str, str, int]:
@@ -135,7 +137,7 @@ def decode(line: str) -> Cell:
 
 
 def _decoded(name: str, value: Any) -> Any:
-    if name in ("seconds", "own", "violation", "gap"):
+    if name in ("seconds", "own", "violation", "gap", "missed"):
         return _numbers(value)
     if name in ("setup", "load", "first", "started", "memory_MB"):
         return _number(value)

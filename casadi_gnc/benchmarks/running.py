@@ -129,7 +129,13 @@ def _header(game: Any, chosen: list[str], families: list[Family], settings: Sett
         "able": {who: [f.name for f in families if game.able(who, f)] for who in chosen},
         "versions": {who: game.versions(who) for who in chosen},
         "absent": game.absent(),
+        "missed": getattr(game, "MISSED", ""),
+        "objectives": {who: told for who in chosen if (told := _objective(game, who))},
     }
+
+
+def _objective(game: Any, who: str) -> str:
+    return game.objective_of(who) if hasattr(game, "objective_of") else ""
 
 
 def _resumed(folder: Path, header: dict[str, Any]) -> Results | None:

@@ -33,6 +33,8 @@ COLUMNS = (
     "mean_us",
     "violation",
     "gap",
+    "missed",
+    "missed_max",
     "iterations",
     "memory_MB",
     "failures",
@@ -151,6 +153,8 @@ def _row(results: Results, who: str, group: str, families: list[str], name: str)
                 _us(_mean(data, limit, settings["shift"])),
                 _largest(value for cell in warm for value in cell.violation),
                 _largest(value for cell in warm for value in cell.gap),
+                _told(_middle(value for cell in warm for value in cell.missed)),
+                _told(_largest(value for cell in warm for value in cell.missed)),
                 float(np.mean([value for cell in warm for value in cell.iterations])),
                 _largest(cell.memory_MB for cell in warm + cold),
                 len(lost(warm + cold)),
@@ -185,6 +189,10 @@ def _apart(results: Results, who: str, families: list[str]) -> tuple[float, floa
 
 def _us(seconds: float) -> float | None:
     return None if np.isnan(seconds) else 1e6 * seconds
+
+
+def _told(value: float) -> float | None:
+    return None if np.isnan(value) else value
 
 
 def _known(values: Iterable[float]) -> np.ndarray:

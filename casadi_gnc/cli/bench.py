@@ -206,7 +206,7 @@ def _print(found: Overview) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from casadi_gnc.benchmarks.markdown import percent, shown, steps_per_second
+    from casadi_gnc.benchmarks.markdown import missed, percent, shown, steps_per_second
     from casadi_gnc.benchmarks.summary import alike
 
     console = Console()
@@ -216,10 +216,18 @@ def _print(found: Overview) -> None:
         table.add_column("", no_wrap=True)
         for head in ("success", "correct", "set-up", "cold", "warm", "p99", "max", "solver", "mean"):
             table.add_column(head, justify="right", no_wrap=True)
-        for row in found.whole(group).values():
+        rows, told = found.whole(group), found.results.header.get("objectives", {})
+        is_missed = any(row["missed"] is not None for row in rows.values())
+        for head in ("gap", *(["missed"] if is_missed else [])):
+            table.add_column(head, justify="right", no_wrap=True)
+        for row in rows.values():
             times = [shown(row[f"{name}_us"]) for name in ("setup", "cold", "warm", "p99", "max", "solver", "mean")]
-            table.add_row(row["contestant"], percent(row["success"]), percent(row["correct"]), *times)
+            worth = [f"{row['gap']:.0e}", *([missed(row)] if is_missed else [])]
+            table.add_row(row["contestant"], percent(row["success"]), percent(row["correct"]), *times, *worth)
         console.print(table)
+        others = [f"{who} ({told[who]})" for who in rows if who in told]
+        if others:
+            console.print(f"another objective: {'; '.join(others)}", highlight=False, markup=False)
         if found.results.header["contest"] == "flight":
             rates = (f"{who} {steps_per_second(row):.3g}" for who, row in found.whole(group).items())
             console.print(f"steps per second: {', '.join(rates)}", highlight=False)

@@ -89,6 +89,19 @@ def test_data_from_outside_is_read_from_mat_and_csv_alike(tmp_path):
     assert (family.name, family.count) == ("data", 3)
 
 
+def test_the_names_of_the_f18_are_read_as_they_are(tmp_path):
+    """QCAT's file of the F-18 has two periods and the times; its examples allocate with the first."""
+    rates = np.array([[-1.0, 2.0], [-3.0, 3.0], [-0.1, 0.1]])
+    f18 = {"B": B, "v": V, "plim": LIMITS, "rlim": rates, "T1": 0.02, "T2": 0.1, "tn": 0.02 * np.arange(4.0)}
+    savemat(tmp_path / "f18.mat", f18)
+    savemat(tmp_path / "admire.mat", {"B": B, "v": V, "plim": LIMITS, "rlim": rates, "T": 0.02, "t": f18["tn"]})
+    found, same = read_outside(tmp_path / "f18.mat"), read_outside(tmp_path / "admire.mat")
+    assert np.array_equal(found.lower, same.lower)
+    assert np.array_equal(found.upper, same.upper)
+    savemat(tmp_path / "none.mat", {name: f18[name] for name in ("B", "v", "plim", "T1")})
+    assert read_outside(tmp_path / "none.mat").problem.count == 3  # no rates: the period does not matter
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -99,8 +112,7 @@ def test_data_from_outside_is_read_from_mat_and_csv_alike(tmp_path):
         ({"v": np.zeros((2, 0))}, "v has no commands"),
         ({"v": V * np.nan}, "v has entries that are not finite"),
         ({"rlim": LIMITS}, "T, the sample period in seconds, is missing: it belongs to rlim; give both or neither$"),
-        # as QCAT's f18data.mat has it
-        ({"rlim": LIMITS, "T1": 0.02, "T2": 0.04}, "there is T1, T2: save one of them as T"),
+        ({"rlim": LIMITS, "T2": 0.04, "tn": V[0]}, "there is T2, tn: save one of them as T"),
         ({"T": 0.02}, "rlim is missing"),
         ({"B": np.array([["a"]], dtype=object)}, "B is no array of numbers"),
         ({"u": np.ones((3, 2))}, "u has 2 samples, v 4"),

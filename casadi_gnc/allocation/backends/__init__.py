@@ -6,7 +6,8 @@ A back end is a module, or a `BackEnd` in one, with
 * `REQUIRES`: the packages it needs, by the names they are imported under;
 * `ACCURACY`: relative gap and rounding floor (share of h |full effort|^2) that its answers keep, by test;
 * `set_up(problem, **options)`: returns an object with
-  `find(command, previous, lower, upper) -> Found`, called once a sample.
+  `find(command, previous, lower, upper) -> Found`, called once a sample;
+* `OBJECTIVE`, only where it minimises something else than the cost of the problem: what that is.
 
 `Found` is what the solver says; nothing of it is believed. `casadi_gnc.allocation.Allocator` moves
 the forces into their bounds and certifies them from the data.
@@ -37,6 +38,7 @@ __all__ = [
     "module",
     "name_of",
     "names",
+    "objective_of",
 ]
 
 
@@ -93,6 +95,7 @@ class BackEnd:
     REQUIRES: tuple[str, ...]
     ACCURACY: tuple[float, float]
     set_up: Callable[..., Solver]
+    OBJECTIVE: str = ""
 
 
 #: Before the name of any solver that qpsolvers finds, whatever its licence.
@@ -119,6 +122,12 @@ REGISTRY = Registry(
             "osqp": "qpsolvers_:OSQP",
             "highs": "qpsolvers_:HIGHS",
             "piqp": "qpsolvers_:PIQP",
+            "wls": "harkegard_:WLS",
+            "eiqp": "eiqp_",
+            "sls": "harkegard_:SLS",
+            "rpinv": "generalized_inverses_:RPINV",
+            "cgi": "generalized_inverses_:CGI",
+            "px4": "px4_",
             "pinv": "pinv_",
         }.items()
     },
@@ -144,6 +153,11 @@ def module(name: Any) -> Any:
 def name_of(name: Any) -> str:
     """Return the name of a back end that is given by it, or as an object."""
     return name if isinstance(name, str) else REGISTRY.name_of(name)
+
+
+def objective_of(name: Any) -> str:
+    """Return what a back end minimises in the place of the problem's cost; empty where it is that cost."""
+    return str(getattr(module(name), "OBJECTIVE", ""))
 
 
 def missing(name: Any) -> list[str]:

@@ -16,6 +16,7 @@ from casadi_gnc.allocation.problem import AllocationProblem
 CAPABILITIES = Capability.ROBUST | Capability.C_CODE
 REQUIRES: tuple[str, ...] = ()
 ACCURACY = (float("inf"), float("inf"))  # none
+OBJECTIVE = "least sum of squared forces for the command, without bounds, which are met by clipping"
 
 
 class _PseudoInverse:

@@ -175,6 +175,9 @@ class Row(TypedDict):
     mean_us: float | None
     violation: float | None
     gap: float | None
+    missed: float | None
+    """Median over samples of the measure that decides nothing; null where the contest has none."""
+    missed_max: float | None
     iterations: float | None
     memory_MB: float | None
     failures: int
