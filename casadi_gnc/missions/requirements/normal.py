@@ -21,8 +21,8 @@ import casadi as ca
 from casadi_gnc.errors import RequirementError
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.missions.requirements import syntax
-from casadi_gnc.missions.requirements.parsing import misplaced
 from casadi_gnc.missions.requirements.quantities import Quantities, called, shared_unit
+from casadi_gnc.missions.requirements.tokens import misplaced
 from casadi_gnc.missions.requirements.tree import BEYOND, Held, Join, Margin, Node, Until, Window
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus

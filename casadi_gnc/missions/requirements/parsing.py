@@ -21,33 +21,20 @@ what it is and what was expected.
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeVar
 
 from casadi_gnc.errors import RequirementError
 from casadi_gnc.missions.requirements import syntax
 from casadi_gnc.missions.requirements.syntax import Condition, Interval, Part, Value
+from casadi_gnc.missions.requirements.tokens import Cursor, shortened
 from casadi_gnc.status import StepStatus
 
 #: Parts inside parts, operations and characters beyond which a text is no formula that anyone reads.
 _DEEPEST, _MOST, _LONGEST = 30, 200, 4000
-_TOKEN = re.compile(
-    r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)|(?P<name>[A-Za-z_][A-Za-z0-9_]*)|(?P<sign><=|>=|==|!=|[-+*/<>()\[\],])"
-)
 _COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
-#: Signs of other languages, and what is written here.
-_MEANT = {"=": "==", "&": "and", "|": "or", "!": "not", "~": "not"}
 
 _Kind = TypeVar("_Kind", bound=Part)
-
-
-@dataclass(frozen=True)
-class _Token:
-    kind: str
-    text: str
-    place: int
 
 
 def parse(text: str) -> Condition:
@@ -71,7 +58,7 @@ def parse(text: str) -> Condition:
         raise RequirementError(
             f"the formula has {len(text)} characters, expected at most {_LONGEST}; split it", "formula"
         )
-    reader = _Reader(text, _tokens(text))
+    reader = _Reader(text)
     found = reader.condition(reader.formula(), "the formula")
     reader.finish()
     if not any(isinstance(part, (syntax.Temporal, syntax.Until)) for part in found.walk()):
@@ -83,76 +70,12 @@ def parse(text: str) -> Condition:
     return found
 
 
-def shortened(text: str) -> str:
-    """Return a text in quotes, on one line, its end cut where it is long."""
-    line = " ".join(text.split())
-    return f'"{line if len(line) <= 60 else line[:57] + "..."}"'
+class _Reader(Cursor):
+    """Read parts of a formula from where the cursor stands."""
 
-
-def misplaced(text: str, place: int, told: str) -> RequirementError:
-    """Return an error that says where in a formula something is wrong."""
-    before = " ".join(text[:place].split())
-    cut = before if len(before) <= 24 else f"...{before[-22:]}"
-    after = f', after "{cut}"' if before else ""
-    return RequirementError(f"at character {place + 1} of the formula{after}: {told}", "formula")
-
-
-def _tokens(text: str) -> list[_Token]:
-    found, place = [], 0
-    while place < len(text):
-        if text[place].isspace():
-            place += 1
-            continue
-        match = _TOKEN.match(text, place)
-        if match is None:
-            hint = f"; write {_MEANT[text[place]]}" if text[place] in _MEANT else ""
-            raise misplaced(text, place, f"{text[place]!r} is no sign of the language{hint}")
-        found.append(_Token(str(match.lastgroup), match[0], place))
-        place = match.end()
-    return [*found, _Token("end", "the end", len(text))]
-
-
-class _Reader:
-    """Go through the tokens once, from left to right."""
-
-    def __init__(self, text: str, tokens: list[_Token]) -> None:
-        self._text, self._tokens = text, tokens
-        self._at = self._depth = self._operations = 0
-
-    # What lies before.
-
-    @property
-    def _next(self) -> _Token:
-        return self._tokens[self._at]
-
-    def _is(self, *texts: str) -> bool:
-        return self._next.kind != "end" and self._next.text in texts
-
-    def _take(self) -> _Token:
-        token = self._next
-        self._at += token.kind != "end"
-        return token
-
-    def _takes(self, *texts: str) -> bool:
-        """Take the next token if it is one of these; return whether it was."""
-        if self._is(*texts):
-            self._at += 1
-            return True
-        return False
-
-    def _expect(self, text: str, where: str) -> None:
-        if not self._takes(text):
-            raise self._unexpected(f'"{text}" {where}')
-
-    def _unexpected(self, expected: str) -> RequirementError:
-        token = self._next
-        found = token.text if token.kind == "end" else f'"{token.text}"'
-        return misplaced(self._text, token.place, f"expected {expected}, found {found}")
-
-    def finish(self) -> None:
-        """Refuse what stands behind the formula."""
-        if self._next.kind != "end":
-            raise self._unexpected("the end, or a word that joins: and, or, implies, until, <=, ...")
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = self._operations = 0
 
     # What a part is.
 
@@ -167,7 +90,7 @@ class _Reader:
     def _of_kind(self, part: Part, kind: type[_Kind], told: str) -> _Kind:
         if isinstance(part, kind):
             return part
-        raise misplaced(self._text, part.place, told)
+        raise self.misplaced(part.place, told)
 
     # The grammar, from what binds loosest.
 
@@ -175,10 +98,10 @@ class _Reader:
         """Read one formula, or one value where that is what stands there."""
         self._depth += 1
         if self._depth > _DEEPEST:
-            raise misplaced(self._text, self._next.place, f"expected at most {_DEEPEST} parts inside each other")
+            raise self.misplaced(self.next.place, f"expected at most {_DEEPEST} parts inside each other")
         left = self._joined(False)
-        place = self._next.place
-        if self._takes("implies"):
+        place = self.next.place
+        if self.takes("implies"):
             premise = self.condition(left, "what stands before implies")
             then = self.condition(self.formula(), "what stands after implies")
             left = syntax.Junction(place, False, (syntax.Not(premise.place, premise), then))
@@ -188,26 +111,26 @@ class _Reader:
     def _joined(self, every: bool) -> Part:
         word = "and" if every else "or"
         parts = [self._span() if every else self._joined(True)]
-        place = self._next.place
-        while self._takes(word):
+        place = self.next.place
+        while self.takes(word):
             parts.append(self._span() if every else self._joined(True))
         if len(parts) == 1:
             return parts[0]
         return syntax.Junction(place, every, tuple(self.condition(part, f"a part of {word}") for part in parts))
 
     def _span(self) -> Part:
-        keep, place = self._negation(), self._next.place
-        if not self._takes("until"):
+        keep, place = self._negation(), self.next.place
+        if not self.takes("until"):
             return keep
         interval = self._interval("until")
         goal = self.condition(self._negation(), "what stands after until")
         return syntax.Until(place, interval, self.condition(keep, "what stands before until"), goal)
 
     def _negation(self) -> Part:
-        place = self._next.place
-        if self._is("not"):
+        place = self.next.place
+        if self.is_next("not"):
             count = 0
-            while self._takes("not"):
+            while self.takes("not"):
                 count += 1
             part = self.condition(self._comparison(), "what stands after not")
             return syntax.Not(place, part) if count % 2 else part
@@ -215,8 +138,8 @@ class _Reader:
 
     def _comparison(self) -> Part:
         left, found = self._sum(), []
-        while self._is(*_COMPARISONS):
-            sign = self._take()
+        while self.is_next(*_COMPARISONS):
+            sign = self.take()
             right = self._sum()
             values = (
                 self.value(left, f"what is left of {sign.text}"),
@@ -236,10 +159,10 @@ class _Reader:
 
     def _operated(self, signs: tuple[str, ...], operand: Callable[[], Part]) -> Part:
         left = operand()
-        while self._is(*signs):
-            sign, self._operations = self._take(), self._operations + 1
+        while self.is_next(*signs):
+            sign, self._operations = self.take(), self._operations + 1
             if self._operations > _MOST:
-                raise misplaced(self._text, sign.place, f"expected at most {_MOST} operations; split the formula")
+                raise self.misplaced(sign.place, f"expected at most {_MOST} operations; split the formula")
             sides = (
                 self.value(left, f"what is left of {sign.text}"),
                 self.value(operand(), f"what is right of {sign.text}"),
@@ -248,9 +171,9 @@ class _Reader:
         return left
 
     def _factor(self) -> Part:
-        place, minus, signs = self._next.place, False, 0
-        while self._is("-", "+"):
-            minus, signs = minus != (self._take().text == "-"), signs + 1
+        place, minus, signs = self.next.place, False, 0
+        while self.is_next("-", "+"):
+            minus, signs = minus != (self.take().text == "-"), signs + 1
         part = self._primary()
         if not signs:
             return part
@@ -260,37 +183,37 @@ class _Reader:
         return syntax.Arithmetic(place, "-", syntax.Number(place, 0.0), value) if minus else value
 
     def _primary(self) -> Part:
-        token = self._next
+        token = self.next
         if token.kind == "number":
             return self._number()
         if token.text in syntax.TEMPORAL:
             return self._temporal()
         if token.text in syntax.FUNCTIONS:
             return self._call()
-        if self._takes("raised"):
+        if self.takes("raised"):
             return self._raised(token.place)
-        if self._takes("("):
+        if self.takes("("):
             part = self.formula()
-            self._expect(")", 'for the "(" before')
+            self.expect(")", 'for the "(" before')
             return part
-        if self._takes("["):
+        if self.takes("["):
             elements = self._listed("an element of the vector")
-            self._expect("]", "at the end of the vector")
+            self.expect("]", "at the end of the vector")
             return syntax.Vector(token.place, elements)
         if token.kind == "name" and token.text not in syntax.WORDS:
             return self._named()
-        raise self._unexpected('a signal, a number, a function or "("')
+        raise self.unexpected('a signal, a number, a function or "("')
 
     def _number(self) -> syntax.Number:
-        token = self._take()
+        token = self.take()
         number = float(token.text)
         if not number < float("inf"):
-            raise misplaced(self._text, token.place, f"{token.text} is beyond the largest number there is")
+            raise self.misplaced(token.place, f"{token.text} is beyond the largest number there is")
         return syntax.Number(token.place, number)
 
     def _named(self) -> syntax.Named:
-        token = self._take()
-        if self._is("("):
+        token = self.take()
+        if self.is_next("("):
             near = difflib.get_close_matches(
                 token.text.lower(), (*syntax.FUNCTIONS, *syntax.TEMPORAL, "raised"), 1, 0.5
             )
@@ -299,72 +222,70 @@ class _Reader:
                 if near
                 else f"; there is {', '.join((*syntax.FUNCTIONS, *syntax.TEMPORAL))}"
             )
-            raise misplaced(self._text, token.place, f"there is no function {token.text!r}{hint}")
-        if not self._takes("["):
+            raise self.misplaced(token.place, f"there is no function {token.text!r}{hint}")
+        if not self.takes("["):
             return syntax.Named(token.place, token.text)
-        number = self._next
+        number = self.next
         if not number.text.isdecimal() or int(number.text) < 1:
-            raise self._unexpected(f"the number of an element of {token.text}, counted from 1")
-        self._take()
-        self._expect("]", f"after the element of {token.text}")
+            raise self.unexpected(f"the number of an element of {token.text}, counted from 1")
+        self.take()
+        self.expect("]", f"after the element of {token.text}")
         return syntax.Named(token.place, token.text, int(number.text))
 
     def _listed(self, what: str) -> tuple[Value, ...]:
         values = [self.value(self.formula(), what)]
-        while self._takes(","):
+        while self.takes(","):
             values.append(self.value(self.formula(), what))
         return tuple(values)
 
     def _call(self) -> syntax.Call:
-        token = self._take()
-        self._expect("(", f"after {token.text}")
+        token = self.take()
+        self.expect("(", f"after {token.text}")
         arguments = self._listed(f"an argument of {token.text}")
-        self._expect(")", f"after the arguments of {token.text}")
+        self.expect(")", f"after the arguments of {token.text}")
         return syntax.Call(token.place, token.text, arguments)
 
     def _raised(self, place: int) -> syntax.Raised:
-        self._expect("(", "after raised")
-        token = self._next
+        self.expect("(", "after raised")
+        token = self.next
         if token.text not in StepStatus.__members__:
             near = difflib.get_close_matches(token.text.upper(), StepStatus.__members__, 1)
             hint = f"did you mean {near[0]}?" if near else f"there is {', '.join(StepStatus.__members__)}"
-            raise misplaced(self._text, token.place, f"there is no status {token.text!r}; {hint}")
-        self._take()
-        self._expect(")", "after the status")
+            raise self.misplaced(token.place, f"there is no status {token.text!r}; {hint}")
+        self.take()
+        self.expect(")", "after the status")
         return syntax.Raised(place, token.text)
 
     def _temporal(self) -> syntax.Temporal:
-        token = self._take()
+        token = self.take()
         interval = self._interval(token.text)
         if token.text == "held" and (interval.last is None or interval.first):
-            raise misplaced(self._text, token.place, "held takes for how long, in seconds: held[60](...)")
-        self._expect("(", f"after {token.text} and its interval")
+            raise self.misplaced(token.place, "held takes for how long, in seconds: held[60](...)")
+        self.expect("(", f"after {token.text} and its interval")
         part = self.formula()
-        self._expect(")", f"at the end of {token.text}(...)")
+        self.expect(")", f"at the end of {token.text}(...)")
         part = self.condition(part, f"what stands in {token.text}(...)")
         return syntax.Temporal(token.place, token.text, interval, part)
 
     def _interval(self, word: str) -> Interval:
         """Read [first, last], [last] or [first, end], where one stands."""
-        place = self._next.place
-        if not self._takes("["):
+        place = self.next.place
+        if not self.takes("["):
             return Interval()
         numbers = [self._second(word)]
-        if self._takes(","):
+        if self.takes(","):
             numbers.append(self._second(word))
-        self._expect("]", f"at the end of the interval of {word}")
+        self.expect("]", f"at the end of the interval of {word}")
         first, last = (0.0, numbers[0]) if len(numbers) == 1 else numbers
         if first is None:
-            raise misplaced(self._text, place, f"the interval of {word} begins at the end; expected a time in seconds")
+            raise self.misplaced(place, f"the interval of {word} begins at the end; expected a time in seconds")
         if last is not None and last < first:
-            raise misplaced(
-                self._text, place, f"the interval of {word} ends at {last:g} s, before it begins at {first:g} s"
-            )
+            raise self.misplaced(place, f"the interval of {word} ends at {last:g} s, before it begins at {first:g} s")
         return Interval(first, last)
 
     def _second(self, word: str) -> float | None:
-        if self._takes("end"):
+        if self.takes("end"):
             return None
-        if self._next.kind != "number":
-            raise self._unexpected(f'a time in seconds, not negative, or "end", in the interval of {word}')
+        if self.next.kind != "number":
+            raise self.unexpected(f'a time in seconds, not negative, or "end", in the interval of {word}')
         return self._number().number

@@ -10,7 +10,7 @@ import casadi as ca
 from casadi_gnc.errors import RequirementError
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.missions.requirements import syntax
-from casadi_gnc.missions.requirements.parsing import misplaced
+from casadi_gnc.missions.requirements.tokens import misplaced
 from casadi_gnc.signals import Layout
 
 

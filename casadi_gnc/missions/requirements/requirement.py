@@ -19,7 +19,8 @@ import numpy as np
 from casadi_gnc.errors import RequirementError, offer
 from casadi_gnc.missions.requirements import evaluating, syntax
 from casadi_gnc.missions.requirements.normal import Bound, bind
-from casadi_gnc.missions.requirements.parsing import parse, shortened
+from casadi_gnc.missions.requirements.parsing import parse
+from casadi_gnc.missions.requirements.tokens import shortened
 from casadi_gnc.missions.requirements.tree import BEYOND
 from casadi_gnc.signals import Layout, Signal
 
