@@ -34,7 +34,7 @@ test test-all test-rest test-long test-oldest: export OPENBLAS_NUM_THREADS = 1
 FAST := -m 'not tools and not packages and not slow and not long'
 
 demo: .venv/installed
-	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble
+	$(BIN)/casadi-gnc fly problems/huang2020/detumble.toml --out $(OUT)/detumble --figures $(OUT)/detumble
 
 test: .venv/installed-dev lint
 	$(BIN)/python $(PYTEST) $(FAST)
@@ -58,19 +58,23 @@ lint: .venv/installed-dev
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 # The pictures of the documentation, from flights made now.
+FIGURES := $(OUT)/figures
+
 pictures: .venv/installed
-	$(BIN)/casadi-gnc fly problems/huang2020/slew.toml --out $(OUT)/slew
-	$(BIN)/casadi-gnc margins huang2020/slew --scheme pd_pinv --scheme funnel_robust --plot docs/images/margins.png
-	$(BIN)/casadi-gnc attainable problems/huang2020/allocation.toml --plot docs/images/attainable.png
-	cp $(OUT)/slew/funnel_robust.png docs/images/slew.png
+	$(BIN)/casadi-gnc fly huang2020/slew --out $(OUT)/slew --figures $(FIGURES)/slew
+	cp $(FIGURES)/slew/funnel_robust.png docs/images/slew.png
 	$(BIN)/python docs/moving_picture.py docs/images/slew.gif
 	$(BIN)/python docs/theory_pictures.py docs/images
-	$(BIN)/casadi-gnc fly problems/shi2020/docking.toml --scheme iobc --out $(OUT)/docking
-	cp $(OUT)/docking/iobc.png docs/images/docking.png
-	$(BIN)/casadi-gnc fly problems/huang2019/vertices.toml --out $(OUT)/vertices
-	cp $(OUT)/vertices/comparison.png docs/images/wheels_vertices.png
-	$(BIN)/casadi-gnc fly problems/tao2019/case2.toml --out $(OUT)/drag_free
-	cp $(OUT)/drag_free/comparison.png docs/images/drag_free.png
+	$(BIN)/casadi-gnc margins huang2020/slew --scheme pd_pinv --scheme funnel_robust --figures docs/images
+	$(BIN)/casadi-gnc attainable huang2020/allocation --figures docs/images
+	$(BIN)/casadi-gnc fly shi2020/docking --scheme iobc --out $(OUT)/docking --figures $(FIGURES)/docking
+	cp $(FIGURES)/docking/iobc.png docs/images/docking.png
+	$(BIN)/casadi-gnc fly huang2019/vertices --out $(OUT)/vertices --figures $(FIGURES)/vertices
+	cp $(FIGURES)/vertices/comparison.png docs/images/wheels_vertices.png
+	$(BIN)/casadi-gnc fly tao2019/case2 --out $(OUT)/drag_free --figures $(FIGURES)/drag_free
+	cp $(FIGURES)/drag_free/comparison.png docs/images/drag_free.png
+	$(BIN)/casadi-gnc fly sun2018/circular_orbit --scheme tracking --out $(OUT)/proximity --figures $(FIGURES)/proximity
+	cp $(FIGURES)/proximity/tracking.png docs/images/proximity.png
 
 bench: .venv/installed-dev
 	$(BIN)/casadi-gnc bench allocation --out $(OUT)/bench/allocation

@@ -14,17 +14,15 @@ import numpy as np
 from casadi_gnc.allocation.attainable_sets import AttainableSet, SetKind, attainable_sets, half_widths
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError
-from casadi_gnc.system.files import write_beside
+from casadi_gnc.system.pictures import COLOURS, FONT, SMALL, check_ending, plain, save, sheet
 
-#: Okabe and Ito's colours, told apart with every kind of colour vision; width of the line (the outer sets are
-#: drawn wider and first, so that coinciding edges show all), strength of the filling, name.
+#: Colour, width of the line (the outer sets are drawn wider and first, so that coinciding edges show all), strength of
+#: the filling, name.
 _STYLES = {
-    SetKind.NOMINAL: ("#56B4E9", 5.0, 0.14, "nominal geometry"),
-    SetKind.EACH_VERTEX: ("#0072B2", 2.6, 0.0, "each vertex, own forces"),
-    SetKind.COMMON_FORCES: ("#D55E00", 1.6, 0.28, "one set of forces for all"),
+    SetKind.NOMINAL: (COLOURS[5], 5.0, 0.14, "nominal geometry"),
+    SetKind.EACH_VERTEX: (COLOURS[0], 2.6, 0.0, "each vertex, own forces"),
+    SetKind.COMMON_FORCES: (COLOURS[1], 1.6, 0.28, "one set of forces for all"),
 }
-#: Points; still legible when the picture is shown at half its width.
-_FONT = 13
 
 
 def plot_slices(
@@ -51,10 +49,10 @@ def plot_slices(
     Raises
     ------
     AllocationError
-        For a single row, too few names, a kind of file that cannot be written, or too many faces to list.
+        For a single row, too few names, or too many faces to list.
+    ProblemError
+        For an ending that is no picture's.
     """
-    from matplotlib.figure import Figure
-
     rows = len(problem.effectiveness)
     if rows < 2:
         raise AllocationError("effectiveness has one row; a slice needs two, see the margins instead")
@@ -64,11 +62,9 @@ def plot_slices(
     planes = list(combinations(range(min(rows, 3)), 2))
     sets = attainable_sets(problem, previous=previous)
     outlines = {one.kind: [outline(one, i, j) * scale for i, j in planes] for one in sets}
-    figure = Figure(figsize=(7.2, 7.2) if len(planes) > 1 else (7.2, 3.8), dpi=120, layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)  # type: ignore[union-attr]
-    kinds = figure.canvas.get_supported_filetypes()
-    if target.suffix[1:] not in kinds:
-        raise AllocationError(f"no picture can be written as {target.name!r}; endings are {', '.join(sorted(kinds))}")
+    figure = sheet(6.4 if len(planes) > 1 else 3.5)
+    figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1)
+    check_ending(target)
     panels = figure.subplots(2, 2).ravel() if len(planes) > 1 else figure.subplots(1, 2)
     limit = _limit(outlines, box)
     for panel, (i, j), k in zip(panels, planes, range(len(planes)), strict=False):
@@ -79,8 +75,7 @@ def plot_slices(
             panel.plot(*corners.T, color="black", linestyle=(0, (4, 2)), linewidth=1.8, zorder=6)
         _dress(panel, axes_names[i], axes_names[j], limit, unit)
     _key(panels[-1], sets, box, scale, unit)
-    write_beside(target, figure.savefig)
-    return target
+    return save(figure, target)
 
 
 def outline(one: AttainableSet, first: int, second: int) -> np.ndarray:
@@ -130,15 +125,12 @@ def _draw(panel: Any, polygon: np.ndarray, colour: str, width: float, filling: f
 
 def _dress(panel: Any, first: str, second: str, limit: float, unit: str) -> None:
     panel.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
-    panel.set_xlabel(f"{first} [{unit}]", fontsize=_FONT)
-    panel.set_ylabel(f"{second} [{unit}]", fontsize=_FONT)
+    plain(panel)
+    panel.set_xlabel(f"{first} [{unit}]")
+    panel.set_ylabel(f"{second} [{unit}]")
     panel.locator_params(nbins=5)
-    panel.tick_params(labelsize=_FONT - 1)
-    panel.grid(color="0.9")
-    panel.set_axisbelow(True)
     panel.axhline(0, color="0.6", linewidth=0.8)
     panel.axvline(0, color="0.6", linewidth=0.8)
-    panel.spines[["top", "right"]].set_visible(False)
 
 
 def _key(panel: Any, sets: tuple[AttainableSet, ...], box: np.ndarray | None, scale: float, unit: str) -> None:
@@ -158,6 +150,6 @@ def _key(panel: Any, sets: tuple[AttainableSet, ...], box: np.ndarray | None, sc
         text = f"wanted ±{box[0]:.3g} {unit}" if is_cube else "wanted box"
         panel.plot([], [], color="black", linestyle=(0, (4, 2)), linewidth=1.8, label=text)
     key = panel.legend(
-        loc="center", fontsize=_FONT - 1, frameon=False, labelspacing=1.0, handlelength=1.6, title="slices through zero"
+        loc="center", fontsize=SMALL, frameon=False, labelspacing=1.0, handlelength=1.6, title="slices through zero"
     )
-    key.get_title().set_fontsize(_FONT)
+    key.get_title().set_fontsize(FONT)

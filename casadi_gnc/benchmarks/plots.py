@@ -10,11 +10,9 @@ import numpy as np
 from casadi_gnc.benchmarks.results import Results
 from casadi_gnc.benchmarks.statistics import charged, performance_profile
 from casadi_gnc.benchmarks.summary import contestants_of, groups, timings
-from casadi_gnc.system.files import write_beside
-from casadi_gnc.system.text import picture
+from casadi_gnc.system.pictures import COLOURS, FONT, SMALL, plain, save, sheet, titled
 
-#: Okabe and Ito's colours, told apart with every kind of colour vision; beyond seven the line's style changes.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+#: Beyond seven contestants the line's style changes.
 _STYLES = ("-", "--", ":", "-.")
 
 
@@ -30,23 +28,17 @@ def times_of(results: Results, group: str) -> dict[str, np.ndarray]:
 
 def plot_group(results: Results, group: str, folder: Path) -> Path:
     """Draw the performance profile and the spread of times of one set as `<set>.svg`; return its path."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
     times, limit = times_of(results, group), results.header["settings"]["time_limit"]
-    figure = Figure(figsize=(11, 0.5 + max(4.0, 0.32 * len(times))), layout="constrained")
-    left, right = figure.subplots(1, 2, sharey=False)
-    _profile(left, times, limit)
-    _spread(right, times, limit)
-    figure.suptitle(
-        picture(f"{results.header['title']}: {group}, accuracy {results.header['settings']['accuracy']}"),
-        ha="left",
-        x=0.02,
-    )
-    target = folder / f"{group}.svg"
-    with rc_context({"svg.hashsalt": group}):  # the same picture is the same file
-        write_beside(target, lambda path: figure.savefig(path, format="svg", metadata={"Date": None}))
-    return target
+    spread = 0.8 + 0.3 * len(times)
+    figure = sheet(5.2 + spread)
+    above, below = figure.subplots(2, 1, height_ratios=(4.4, spread))
+    for panel in (above, below):
+        plain(panel)
+    _profile(above, times, limit)
+    _spread(below, times, limit)
+    title = f"{results.header['title']}: {group}, accuracy {results.header['settings']['accuracy']}"
+    figure.suptitle(titled(title), fontsize=FONT, ha="left", x=0.02)
+    return save(figure, folder / f"{group}.svg")
 
 
 def _style(place: int) -> dict[str, Any]:
@@ -61,8 +53,7 @@ def _profile(axes: Any, times: dict[str, np.ndarray], limit: float) -> None:
     axes.set_xlabel("within this factor of the fastest [-]")
     axes.set_ylabel("samples solved [%]")
     axes.set_ylim(-2, 102)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=7, loc="lower right")
+    axes.legend(fontsize=SMALL, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def _spread(axes: Any, times: dict[str, np.ndarray], limit: float) -> None:
@@ -76,10 +67,10 @@ def _spread(axes: Any, times: dict[str, np.ndarray], limit: float) -> None:
             axes.plot(np.median(solved), place, "o", color=colour)
         failed = int(np.sum(seconds >= limit))
         text = who if not failed else f"{who} ({failed} failed)"
-        axes.text(1.02, place, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8)
+        axes.text(1.02, place, text, transform=axes.get_yaxis_transform(), va="center", fontsize=SMALL)
     axes.axvline(1e6 * limit, color="#888888", linestyle=":", linewidth=1)
     axes.set_xscale("log")
     axes.set_xlabel("warm solve [us]: least, 5 to 95 %, median, largest")
     axes.set_yticks([])
     axes.invert_yaxis()
-    axes.grid(alpha=0.3, axis="x")
+    axes.grid(axis="y", visible=False)

@@ -15,8 +15,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
-from scipy.optimize import linprog
 
 from casadi_gnc.checking import flown, programs
 from casadi_gnc.checking.authority import believed
@@ -146,6 +144,9 @@ def _needed_share(
     mission: Mission, funnel: Funnel, data: bytes, shape: tuple[int, int], *box: tuple[float, ...]
 ) -> float:
     """Return the share for one believed effectiveness and one box; schemes often have the same."""
+    from scipy import sparse  # a flight does without
+    from scipy.optimize import linprog
+
     matrix = np.frombuffer(data).reshape(shape)
     most_below, most_above, limit_below, limit_above = (np.array(each) for each in box)
     times, drift, gain, place, speed = _second_order(mission, funnel)

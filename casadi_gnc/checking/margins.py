@@ -30,7 +30,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy import optimize
 
 #: Frequencies looked at, and the largest factor of gain that is called infinite.
 _GRID, _ENDLESS = 3000, 1e6
@@ -235,6 +234,8 @@ def _confirmed(loop: BrokenLoop, found: list[tuple[float, float]], never: float)
 
 def _crossings(grid: np.ndarray, values: np.ndarray, function: Callable[[float], float]) -> list[float]:
     """Return where a function changes its sign, the frequencies by bisection to rounding."""
+    from scipy import optimize  # a flight does without
+
     at = np.flatnonzero(np.sign(values[1:]) * np.sign(values[:-1]) < 0)
     found: list[Any] = [optimize.brentq(function, grid[i], grid[i + 1], xtol=1e-15) for i in at]
     return [float(each) for each in found]
@@ -242,6 +243,8 @@ def _crossings(grid: np.ndarray, values: np.ndarray, function: Callable[[float],
 
 def _least(grid: np.ndarray, values: np.ndarray, function: Callable[[float], float]) -> tuple[float, float]:
     """Return the least value and its frequency, refined around the least of the grid."""
+    from scipy import optimize
+
     i = int(np.argmin(values))
     low, high = grid[max(i - 1, 0)], grid[min(i + 1, len(grid) - 1)]
     found = optimize.minimize_scalar(function, bounds=(low, high), method="bounded", options={"xatol": 1e-9 * high})

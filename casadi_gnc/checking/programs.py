@@ -1,12 +1,13 @@
-"""Linear programs of one shape that differ in their data, solved as one: the set-up of each costs more than it does."""
+"""Linear programs of one shape that differ in their data, solved as one: the set-up of each costs more than it does.
+
+SciPy's programs are imported where they are solved: a flight does without.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
-from scipy import sparse
-from scipy.optimize import linprog
 
 #: Largest share that is looked for.
 _MOST = 1e6
@@ -27,6 +28,9 @@ def largest_shares(matrix: np.ndarray, wanted: np.ndarray, lower: Any, upper: An
     wanted : (K, R).
     lower, upper : bounds of F, (N,).
     """
+    from scipy import sparse
+    from scipy.optimize import linprog
+
     count, n = len(wanted), matrix.shape[1]
     # Rows in their own units: arms of kilometres beside centimetres are no reason to fail.
     reach = _units(np.abs(matrix) @ np.maximum(np.abs(np.array(lower)), np.abs(np.array(upper))))
@@ -57,6 +61,9 @@ def least_shares(bounds: np.ndarray, gain: np.ndarray, load: np.ndarray) -> np.n
     bounds : (M, N + 1), the same for all.
     gain, load : G, (K, n, N), and d, (K, n).
     """
+    from scipy import sparse
+    from scipy.optimize import linprog
+
     count, n = len(gain), gain.shape[2]
     bounds = bounds / _units(np.abs(bounds).max(axis=1))[:, None]
     size = _units(np.abs(gain).max(axis=2))

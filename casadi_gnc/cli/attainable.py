@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import print_json, tell
+from casadi_gnc.cli.manners import Ending, Figures, Format, print_json, tell
 from casadi_gnc.cli.progress import working
 
 
@@ -17,7 +16,8 @@ def attainable(
         str,
         typer.Argument(autocompletion=completing.problems, help="An allocation file, or the name of a shipped one."),
     ],
-    plot: Annotated[Path | None, typer.Option(help="Draw the sets' slices into this PNG.")] = None,
+    figures: Figures = None,
+    ending: Format = Ending.png,
     samples: Annotated[int, typer.Option(min=0, help="Errors tried besides the corners.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
@@ -32,8 +32,7 @@ def attainable(
     from casadi_gnc.system.files import prepare_folder
 
     case = load_allocation(problem)
-    if plot is not None:
-        prepare_folder(plot.parent)
+    drawn = None if figures is None else prepare_folder(figures) / f"attainable.{ending.value}"
     with working("measuring attainable sets"):
         found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed, units=case.units)
     if json:
@@ -44,8 +43,8 @@ def attainable(
             typer.echo(sentence)
         for reach in found.reaches:
             typer.echo(reach.along(found.directions))
-    if plot is not None:
+    if drawn is not None:
         from casadi_gnc.allocation.attainable_plots import plot_slices
 
-        plot_slices(case.physical, plot, wanted=case.torque_limit)
-        tell(f"wrote {plot}", aside=json)
+        plot_slices(case.physical, drawn, wanted=case.torque_limit)
+        tell(f"wrote {drawn}", aside=json)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,19 +9,11 @@ import typer
 
 from casadi_gnc.cli import completing
 from casadi_gnc.cli.campaign_summary import print_summary
-from casadi_gnc.cli.manners import print_json, tell
+from casadi_gnc.cli.manners import Ending, Figures, Format, print_json, tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.result import Campaign
-
-
-class Ending(str, Enum):
-    """Kinds of pictures."""
-
-    png = "png"
-    svg = "svg"
-    pdf = "pdf"
 
 
 def campaign(
@@ -59,9 +50,9 @@ def campaign(
     keep: Annotated[
         str | None, typer.Option(help="Whole records to keep, such as worst:20,failed:50,random:10.")
     ] = None,
-    pictures: Annotated[Path | None, typer.Option(help="Draw what the flights say into this folder.")] = None,
+    figures: Figures = None,
+    ending: Format = Ending.png,
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
-    picture_format: Annotated[Ending, typer.Option("--format", help="Of the pictures.")] = Ending.png,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
     confidence: Annotated[float, typer.Option(help="Of the bounds that are told.")] = 0.9,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
@@ -72,20 +63,20 @@ def campaign(
 
     casadi-gnc campaign mission.toml --flights 10000 --out mc/
 
-    casadi-gnc campaign show mc/ --pictures mc/pictures
+    casadi-gnc campaign show mc/ --figures mc/figures
     """
     from casadi_gnc.campaigns.campaign import parts_of
     from casadi_gnc.campaigns.keeping import FOLDER, Keep
     from casadi_gnc.errors import CampaignError
     from casadi_gnc.problem_files import by_name
-    from casadi_gnc.reports.style import check_page
+    from casadi_gnc.reports.endings import check_page
 
     if report is not None:
         check_page(report)
     if problem == "show":
         if folder is None:
             raise CampaignError("which campaign? give its folder: casadi-gnc campaign show FOLDER")
-        _tell(by_name.open_campaign(folder), confidence, json, pictures, picture_format, report)
+        _tell(by_name.open_campaign(folder), confidence, json, figures, ending, report)
         return
     if folder is not None:
         raise CampaignError(f"what is {str(folder)!r}? the folder of a campaign is given as --out {folder}")
@@ -115,25 +106,25 @@ def campaign(
         files = -(-made.identity["cases"] // made.identity["shard"])
         typer.echo(f"part {shard} has no cases: the campaign is {'one file' if files == 1 else f'{files} files'}")
         return
-    _tell(made, confidence, json, pictures, picture_format, report)
+    _tell(made, confidence, json, figures, ending, report)
     if keep is not None and (made.folder / FOLDER).exists():
         count = len(list((made.folder / FOLDER).glob("*.npz")))
         tell(f"kept {count} whole records in {made.folder / FOLDER}", aside=json)
 
 
 def _tell(
-    made: Campaign, confidence: float, json: bool, pictures: Path | None, ending: Ending, report: Path | None
+    made: Campaign, confidence: float, json: bool, figures: Path | None, ending: Ending, report: Path | None
 ) -> None:
     """Print what a campaign says, and draw it where that is asked for."""
     if not json:
         print_summary(made, confidence)
     else:
         print_json(made.summary(confidence))
-    if pictures is not None:
+    if figures is not None:
         from casadi_gnc.reports.campaign_gallery import draw_campaign
 
-        drawn = draw_campaign(made, pictures, confidence=confidence, ending=ending.value)
-        tell(f"drew {len(drawn)} pictures into {pictures}", aside=json)
+        drawn = draw_campaign(made, figures, confidence=confidence, ending=ending.value)
+        tell(f"drew {len(drawn)} pictures into {figures}", aside=json)
     if report is not None:
         from casadi_gnc.reports.campaign_page import of_campaign
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import print_json
+from casadi_gnc.cli.manners import Ending, Figures, Format, print_json
 from casadi_gnc.cli.progress import working
 
 if TYPE_CHECKING:
@@ -28,7 +28,8 @@ def check(
     scheme: Annotated[
         list[str] | None, typer.Option(autocompletion=completing.schemes, help="Only this scheme; may be repeated.")
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the margins into this file (.png or .svg).")] = None,
+    figures: Figures = None,
+    ending: Format = Ending.png,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
 ) -> None:
@@ -36,7 +37,7 @@ def check(
     from casadi_gnc.checks import worst
 
     if report is not None:
-        from casadi_gnc.reports.style import check_page
+        from casadi_gnc.reports.endings import check_page
 
         check_page(report)
     checked = _checked(problem, scheme)
@@ -45,14 +46,16 @@ def check(
         from casadi_gnc.reports.check_page import of_checks
 
         of_checks(title, found, report, checked.mission)
-    if plot is not None:
+    drawn = None
+    if figures is not None:
         from casadi_gnc.reports.check_picture import draw
+        from casadi_gnc.system.files import prepare_folder
 
-        draw(title, found, plot)
+        drawn = draw(title, found, prepare_folder(figures) / f"checks.{ending.value}")
     if json:
         _print_json(title, found)
     else:
-        _print(title, found, plot)
+        _print(title, found, drawn)
         if report is not None:
             typer.echo(f"wrote {report}")
     if worst(found) == "fail":
@@ -100,7 +103,7 @@ def _sections(found: list[Check]) -> list[tuple[str, list[Check]]]:
     return made + [(name, checks) for name, checks in rest.items() if checks]
 
 
-def _print(title: str, found: list[Check], plot: Path | None) -> None:
+def _print(title: str, found: list[Check], drawn: Path | None) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -132,5 +135,5 @@ def _print(title: str, found: list[Check], plot: Path | None) -> None:
         console.print(sentence, highlight=False, markup=False)
     counts = {verdict: sum(one.verdict == verdict for one in found) for verdict in ("ok", "note", "warn", "fail")}
     console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()), highlight=False)
-    if plot is not None:
-        console.print(f"wrote {plot}", highlight=False, markup=False)
+    if drawn is not None:
+        console.print(f"wrote {drawn}", highlight=False, markup=False)

@@ -36,10 +36,10 @@ COMMANDS = (
     Entry(
         fly.fly,
         FLY,
-        "Fly a mission; keep records, summary, pictures.",
+        "Fly a mission; keep records and a summary, draw pictures.",
         (
             "fly huang2020/detumble --out out/detumble",
-            "fly mission.toml --scheme observer_robust --report flight.html",
+            "fly mission.toml --scheme observer_robust --figures figures --format pdf --report flight.html",
             "fly mc/ --case worst:settling_time --out worst/",
         ),
         is_about_a_file=True,
@@ -50,7 +50,7 @@ COMMANDS = (
         "Fly thousands of dispersed cases; show what they say.",
         (
             "campaign mission.toml --flights 10000 --out mc/",
-            "campaign show mc/ --pictures mc/pictures --report mc.html",
+            "campaign show mc/ --figures mc/figures --report mc.html",
         ),
     ),
     Entry(
@@ -74,13 +74,13 @@ COMMANDS = (
         check.check,
         FLY,
         "Tell what would go wrong, before the flight.",
-        ("check huang2020/slew", "check mission.toml --plot margins.png --report checks.html"),
+        ("check huang2020/slew", "check mission.toml --figures figures --report checks.html"),
     ),
     Entry(
         margins.margins,
         FLY,
         "Gain, phase, delay and disk margins of every loop.",
-        ("margins satellites/slew_and_track", "margins mission.toml --scheme pd --plot nichols.svg"),
+        ("margins satellites/slew_and_track", "margins mission.toml --scheme pd --figures figures --format svg"),
         is_about_a_file=True,
     ),
     Entry(
@@ -98,7 +98,7 @@ COMMANDS = (
         attainable.attainable,
         GAINS,
         "What the actuators can make, nominal and for every error.",
-        ("attainable huang2020/allocation --plot sets.png",),
+        ("attainable huang2020/allocation --figures figures",),
         is_about_a_file=True,
     ),
     Entry(

@@ -32,8 +32,8 @@ def demo(
     page = out / "report.html"
     if json:
         with unheard():
-            fly(str(copy), out=out, plots=False, report=page)
+            fly(str(copy), out=out, report=page)
         tell_written([copy, page], json=True)
         return
-    fly(str(copy), out=out, plots=False, report=page)
+    fly(str(copy), out=out, report=page)
     typer.echo(f"look at {page} in a browser; change {copy}, then: casadi-gnc fly {shell(copy)} --report {shell(page)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
+from casadi_gnc.cli.manners import Ending, Figures, Format
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -52,29 +54,30 @@ def fly(
         str | None,
         typer.Option(help="Of a campaign's folder: a number, worst:METRIC, median:METRIC, failed:ID, failed:1."),
     ] = None,
-    plots: Annotated[bool, typer.Option(help="Draw pictures.")] = True,
+    figures: Figures = None,
+    ending: Format = Ending.png,
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
-    """Fly a mission and write <scheme>.npz, summary.json, mission.json and pictures; of sweeps summary.json alone."""
+    """Fly a mission and write <scheme>.npz, summary.json and mission.json; of sweeps summary.json alone."""
     from casadi_gnc.errors import ReportError
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.problem_files.sweeping import load_sweeps
-    from casadi_gnc.reports.style import check_page
+    from casadi_gnc.reports.endings import check_page
     from casadi_gnc.system.files import prepare_folder
 
     if report is not None:
         check_page(report)
     if case is not None:
-        _fly_case(Path(problem), case, out, decimation, plots, json, report)
+        _fly_case(Path(problem), case, out, decimation, figures, ending, json, report)
         return
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
     folder = prepare_folder(Path("out") / mission.name if out is None else out)
     if sweeps := load_sweeps(problem):
-        if report is not None:
-            raise ReportError("a mission with sweeps keeps no records to draw; fly it without --report")
+        if report is not None or figures is not None:
+            raise ReportError("a mission with sweeps keeps no records to draw; fly it without --report and --figures")
         options = {"engine": engine, "maths": math.value, "mode": mode.value if mode else None}
         _fly_sweeps(mission, sweeps, list(dict.fromkeys(chosen)), folder, json, options)
         return
@@ -89,7 +92,7 @@ def fly(
                 )
             )  # fmt: skip
         flights[-1].save(folder)
-    written = _keep(mission.with_timing(mode=mode.value) if mode else mission, flights, folder, plots, report)
+    written = _keep(mission.with_timing(mode=mode.value) if mode else mission, flights, folder, figures, ending, report)
     if json:
         typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
     else:
@@ -98,15 +101,20 @@ def fly(
         raise typer.Exit(1)
 
 
-def _keep(mission: Mission, flights: list[Flight], folder: Path, plots: bool, report: Path | None) -> list[Path]:
-    """Write what is kept of flights beside their records, and return all paths."""
+def _keep(
+    mission: Mission, flights: list[Flight], folder: Path, figures: Path | None, ending: Ending, report: Path | None
+) -> list[Path]:
+    """Write what is kept of flights beside their records, and what is to be looked at; return all paths."""
     from casadi_gnc.missions.flight import save_summary
     from casadi_gnc.reports import describing
 
     written = [folder / f"{flight.scheme}.npz" for flight in flights]
     written += [save_summary(folder, flights), describing.save(folder, mission, [one.scheme for one in flights])]
-    if plots:
-        written += _draw(mission, flights, folder)
+    if figures is not None:
+        from casadi_gnc.reports.flight_pictures import plot_flights
+        from casadi_gnc.system.files import prepare_folder
+
+        written += plot_flights(mission, flights, prepare_folder(figures), ending.value)
     if report is not None:
         from casadi_gnc.reports import flight_page
 
@@ -119,7 +127,8 @@ def _fly_case(
     case: str,
     out: Path | None,
     decimation: int | None,
-    plots: bool,
+    figures: Path | None,
+    ending: Ending,
     json: bool,
     report: Path | None,
 ) -> None:
@@ -133,7 +142,7 @@ def _fly_case(
     with Progress(f"case {found.number}", quiet=json) as progress:
         flight = found.fly(decimation=decimation, progress=progress)
     flight.save(folder)
-    written = _keep(mission, [flight], folder, plots, report)
+    written = _keep(mission, [flight], folder, figures, ending, report)
     if json:
         typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
     else:
@@ -188,15 +197,6 @@ def _fly_sweeps(
     console.print(f"wrote to {folder}: {written.name}", highlight=False, markup=False)
 
 
-def _draw(mission: Mission, flights: list[Flight], folder: Path) -> list[Path]:
-    from casadi_gnc.reports import flight_pictures as plots
-
-    pictures = [plots.plot_flight(mission, flight, folder) for flight in flights]
-    if len(flights) > 1:
-        pictures.append(plots.plot_comparison(mission, flights, folder))
-    return pictures
-
-
 def _print(mission: Mission, flights: list[Flight], written: list[Path], report: Path | None) -> None:
     from rich.console import Console
     from rich.markup import escape
@@ -227,8 +227,9 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path], report:
             )
         for note in flight.notes:
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
-    names = ", ".join(path.name for path in written)
-    console.print(f"wrote to {written[0].parent}: {names}", highlight=False, markup=False)
+    for where, paths in itertools.groupby(written, key=lambda path: path.parent):
+        names = ", ".join(path.name for path in paths)
+        console.print(f"wrote to {where}: {names}", highlight=False, markup=False)
     if report is not None:
         console.print(f"wrote {report}", highlight=False, markup=False)
 

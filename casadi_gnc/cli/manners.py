@@ -7,6 +7,7 @@ import inspect
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import wraps
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,6 +20,19 @@ from casadi_gnc.cli import progress
 _Quiet = Annotated[
     bool, typer.Option("--quiet", help="Print warnings and errors only, and what --json or a table asks for.")
 ]
+
+
+class Ending(str, Enum):
+    """Kinds of pictures."""
+
+    png = "png"
+    svg = "svg"
+    pdf = "pdf"
+
+
+#: The two options of every command that draws.
+Figures = Annotated[Path | None, typer.Option("--figures", help="Draw pictures into this folder.")]
+Format = Annotated[Ending, typer.Option("--format", help="Of the pictures.")]
 
 
 @dataclass(frozen=True)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import print_json
+from casadi_gnc.cli.manners import Ending, Figures, Format, print_json
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -23,15 +22,15 @@ def margins(
     scheme: Annotated[
         list[str] | None, typer.Option(autocompletion=completing.schemes, help="Only this scheme; may be repeated.")
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw Nichols and Bode pictures into this file (.png, .svg).")
-    ] = None,
+    figures: Figures = None,
+    ending: Format = Ending.png,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Show gain, phase, delay, modulus and disk margins of each effort and measurement, sampled as it flies."""
     from casadi_gnc.checking.broken_loops import scheme_margins
     from casadi_gnc.errors import FlightError
     from casadi_gnc.problem_files.loading import load
+    from casadi_gnc.system.files import prepare_folder
 
     mission = load(problem)
     found, lacking = [], []
@@ -45,18 +44,19 @@ def margins(
             told(done, len(asked))
     if not found:
         raise FlightError("; ".join(lacking))
-    if plot is not None:
+    drawn = None
+    if figures is not None:
         from casadi_gnc.reports.margins_picture import draw
 
-        draw(mission.title or mission.name, found, plot)
+        drawn = draw(mission.title or mission.name, found, prepare_folder(figures) / f"margins.{ending.value}")
     if json:
         _print_json(mission.title, found, lacking)
         return
     _print(mission.title or mission.name, found)
     for sentence in lacking:
         typer.echo(f"note: {sentence}")
-    if plot is not None:
-        typer.echo(f"wrote {plot}")
+    if drawn is not None:
+        typer.echo(f"wrote {drawn}")
 
 
 def _print(title: str, found: list[SchemeMargins]) -> None:

@@ -21,7 +21,7 @@ def report(
     A problem is checked, and a package verified on this machine, which runs the code that it keeps with your rights.
     """
     from casadi_gnc.reports import writing
-    from casadi_gnc.reports.style import check_page
+    from casadi_gnc.reports.endings import check_page
 
     check_page(out)
     with working(f"writing {out}"):

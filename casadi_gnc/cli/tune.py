@@ -60,7 +60,7 @@ def tune(
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Tune gains and write them; exit code 1 if none better were found. A run that was killed goes on where it was."""
-    from casadi_gnc.reports.style import check_page
+    from casadi_gnc.reports.endings import check_page
     from casadi_gnc.tuning.tune import tune as tuned
 
     if report is not None:

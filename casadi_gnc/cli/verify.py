@@ -29,7 +29,7 @@ def verify(
     """
     from casadi_gnc.delivery.verifying import verify as run
     from casadi_gnc.embedded import boards
-    from casadi_gnc.reports.style import check_page
+    from casadi_gnc.reports.endings import check_page
 
     if report is not None:
         check_page(report)

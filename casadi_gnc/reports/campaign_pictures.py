@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.campaigns.statistics import Convergence, Estimate, Percentile
-from casadi_gnc.reports.style import COLOURS, FONT, check_ending, plain, rows, save
+from casadi_gnc.system.pictures import COLOURS, FONT, SMALL, check_ending, plain, rows, save, sheet, titled
 from casadi_gnc.system.text import picture
 
 #: Cases drawn as points; more are thinned, the worst never.
@@ -63,7 +63,7 @@ def plot_histogram(
     axes.set_xlabel(picture(label))
     axes.set_ylabel("flights [%]")
     told = f"{len(values)} flights" + (f", {int((~finite).sum())} without a value" if not finite.all() else "")
-    axes.set_title(picture(f"{title}: {told}" if title else told), fontsize=FONT, loc="left")
+    axes.set_title(titled(f"{title}: {told}" if title else told), fontsize=FONT, loc="left")
     if percentiles or limit is not None:
         _below(figure, axes, 3)
     return save(figure, target)
@@ -99,7 +99,7 @@ def plot_convergence(
     axes.set_xlabel("flights")
     axes.set_ylabel(picture(label))
     axes.ticklabel_format(axis="y", useOffset=False)
-    axes.set_title(picture(title), fontsize=FONT, loc="left")
+    axes.set_title(titled(title), fontsize=FONT, loc="left")
     _below(figure, axes, 3)
     return save(figure, target)
 
@@ -124,8 +124,6 @@ def plot_scatter(
     label : of the metric, with its unit.
     worst : places of flights that are marked.
     """
-    from matplotlib.figure import Figure
-
     check_ending(target)
     columns, count = np.asarray(inputs)[:, :_PANELS], len(output)
     values, marked = np.asarray(output, dtype=float), np.zeros(len(output), dtype=bool)
@@ -137,7 +135,7 @@ def plot_scatter(
     top = float(values[finite].max()) if finite.any() else 0.0
     across = 1 if columns.shape[1] == 1 else 2
     down = -(-columns.shape[1] // across)
-    figure = Figure(figsize=(7.2, 3.0 * down + 0.6), dpi=120, layout="constrained")
+    figure = sheet(2.9 * down + 0.6)
     panels = figure.subplots(down, across, sharey=True, squeeze=False).ravel()
     for place, (axes, name, column) in enumerate(zip(panels, names, columns.T, strict=False)):
         plain(axes)
@@ -152,7 +150,7 @@ def plot_scatter(
             axes.set_ylabel(picture(label))
     for axes in panels[columns.shape[1] :]:
         axes.set_visible(False)
-    figure.suptitle(picture(title), fontsize=FONT, x=0.02, ha="left")
+    figure.suptitle(titled(title), fontsize=FONT, x=0.02, ha="left")
     _below(figure, panels[0], 2)
     return save(figure, target)
 
@@ -190,10 +188,10 @@ def plot_drivers(
         axes.hlines(places, *ends, color="0.2", linewidth=1.4)
     axes.axvline(0.0, color="0.3", linewidth=1.0)
     axes.set_yticks(range(len(order)))
-    axes.set_yticklabels([picture(names[i]) for i in order], fontsize=FONT - 1)
+    axes.set_yticklabels([picture(names[i]) for i in order], fontsize=SMALL)
     axes.grid(axis="y", visible=False)
     axes.set_xlabel(picture(label))
-    axes.set_title(picture(title), fontsize=FONT, loc="left")
+    axes.set_title(titled(title), fontsize=FONT, loc="left")
     if total:
         _below(figure, axes, 2)
     return save(figure, target)
@@ -202,7 +200,7 @@ def plot_drivers(
 def _below(figure: Any, panel: Any, columns: int) -> None:
     """Put the legend of a panel below all, where it hides nothing."""
     handles, labels = panel.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=FONT - 1, frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=SMALL, frameon=False)
 
 
 def _points(column: np.ndarray, values: np.ndarray, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

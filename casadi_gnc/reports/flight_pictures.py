@@ -16,8 +16,8 @@ from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.recording import funnel_signals
-from casadi_gnc.reports.style import COLOURS, FONT, legend, rows, save
 from casadi_gnc.reports.thinning import kept
+from casadi_gnc.system.pictures import COLOURS, FONT, SMALL, legend, rows, save, titled
 from casadi_gnc.system.text import picture
 
 #: Points drawn of a signal; more are thinned to the envelope's extremes.
@@ -26,24 +26,26 @@ _POINTS = 2000
 _FEW = 6
 
 
-def plot_flight(mission: Mission, flight: Flight, folder: Path) -> Path:
-    """Draw one flight as `<scheme>.png`, a panel for each of the mission's, and return its path."""
+def plot_flights(mission: Mission, flights: Sequence[Flight], folder: Path, ending: str = "png") -> list[Path]:
+    """Draw each flight, and all in one picture where there are several; return their paths."""
+    drawn = [plot_flight(mission, flight, folder, ending) for flight in flights]
+    return drawn if len(flights) < 2 else [*drawn, plot_comparison(mission, flights, folder, ending)]
+
+
+def plot_flight(mission: Mission, flight: Flight, folder: Path, ending: str = "png") -> Path:
+    """Draw one flight as `<scheme>.png`, .svg or .pdf, a panel for each of the mission's, and return its path."""
     panels = mission.craft.panels(mission)
     figure, axes = rows(len(panels), height=2.8 * len(panels))
     draw = {"tracked": _tracked, "effort": _effort, "actuators": _actuators, "lines": _signal}
     for panel, each in zip(panels, axes, strict=True):
         draw[panel.kind](each, mission, flight, panel)
-    figure.suptitle(
-        picture(f"{mission.title}\n{flight.title}" if mission.title else flight.title),
-        fontsize=FONT + 1,
-        x=0.02,
-        ha="left",
-    )
+    title = f"{mission.title}\n{flight.title}" if mission.title else flight.title
+    figure.suptitle(titled(title), fontsize=FONT, x=0.02, ha="left")
     axes[-1].set_xlabel("time [s]")
-    return save(figure, folder / f"{flight.scheme}.png")
+    return save(figure, folder / f"{flight.scheme}.{ending}")
 
 
-def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -> Path:
+def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path, ending: str = "png") -> Path:
     """Draw all flights on logarithmic axes and return the path of the picture.
 
     Drawn is the share of each funnel that was used, or, where there is no funnel, the largest
@@ -76,9 +78,9 @@ def plot_comparison(mission: Mission, flights: Sequence[Flight], folder: Path) -
             each.axhline(level, color="0.4", linestyle="--", linewidth=1.2, label=told)
         each.set_ylabel(label if len(wanted) == 1 else "\n".join(textwrap.wrap(label, 22)))
     axes[-1].set_xlabel("time [s]")
-    axes[0].set_title(picture(mission.title), fontsize=FONT + 1, loc="left")
-    figure.legend(loc="outside lower center", fontsize=FONT, frameon=False)
-    return save(figure, folder / "comparison.png")
+    axes[0].set_title(titled(mission.title), fontsize=FONT, loc="left")
+    figure.legend(loc="outside lower center", fontsize=SMALL, frameon=False)
+    return save(figure, folder / f"comparison.{ending}")
 
 
 def _compared(mission: Mission) -> list[tuple[Panel, str]]:
@@ -149,7 +151,7 @@ def _tracked(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> None:
         axes.axhspan(-threshold, threshold, color="0.92", zorder=0)
         axes.annotate(
             f"±{threshold:g}", (0.995, threshold), xycoords=("axes fraction", "data"), ha="right", va="bottom",
-            fontsize=FONT - 2, color="0.3",
+            fontsize=SMALL, color="0.3",
         )  # fmt: skip
     legend(axes, block.shape[1])
 
@@ -218,5 +220,5 @@ def _actuators(axes: Any, mission: Mission, flight: Flight, panel: Panel) -> Non
     )  # fmt: skip
     axes.grid(visible=False)
     bar = axes.figure.colorbar(image, ax=axes, pad=0.01)
-    bar.ax.set_title(panel.unit or flight.unit(panel.signal), fontsize=FONT - 1)
-    bar.ax.tick_params(labelsize=FONT - 2)
+    bar.ax.set_title(panel.unit or flight.unit(panel.signal), fontsize=SMALL)
+    bar.ax.tick_params(labelsize=SMALL)

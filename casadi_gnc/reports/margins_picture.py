@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.checking.broken_loops import SchemeMargins
-from casadi_gnc.reports.style import COLOURS, FONT, check_ending, plain, save
+from casadi_gnc.system.pictures import COLOURS, FONT, SMALL, check_ending, plain, save, sheet, titled
 from casadi_gnc.system.text import picture
 
 _DASHES = ("-", "--", ":", "-.")
@@ -19,10 +19,8 @@ _ENDS = (-60.0, 60.0)
 
 def draw(title: str, found: Sequence[SchemeMargins], target: Path) -> Path:
     """Draw a line for each effort of each scheme; raise `ProblemError` for an ending that is no picture's."""
-    from matplotlib.figure import Figure
-
     check_ending(target)
-    figure = Figure(figsize=(7.2, 8.4), dpi=120, layout="constrained")
+    figure = sheet(8.4)
     nichols, size, turn = figure.subplots(3, 1, height_ratios=(2.2, 1, 1))
     for panel in (nichols, size, turn):
         plain(panel)
@@ -45,8 +43,8 @@ def draw(title: str, found: Sequence[SchemeMargins], target: Path) -> Path:
     _critical(nichols, min(one.disk_of_efforts for one in found))
     nichols.set(xlim=(-360, 0), ylim=_ENDS, xlabel="phase [deg]", ylabel="gain [dB]")
     nichols.set_xticks(range(-360, 1, 45))
-    nichols.legend(fontsize=FONT - 2, frameon=False, ncols=2, loc="lower left")
-    nichols.set_title(picture(title), fontsize=FONT, loc="left")
+    figure.legend(fontsize=SMALL, frameon=False, ncols=2, loc="outside lower center")
+    nichols.set_title(titled(title), fontsize=FONT, loc="left")
     size.axhline(0, color="0.3", linewidth=0.8)
     size.set(ylim=_ENDS, ylabel="gain [dB]", xlim=(slowest, None))
     turn.axhline(-180, color="0.3", linewidth=0.8)

@@ -18,8 +18,8 @@ from typing import Any
 
 from markupsafe import Markup
 
+from casadi_gnc.reports.endings import check_page
 from casadi_gnc.reports.packed import Packed
-from casadi_gnc.reports.style import check_page
 from casadi_gnc.system import assets
 from casadi_gnc.system.files import prepare_folder, write_beside
 from casadi_gnc.system.templates import template

@@ -8,7 +8,7 @@ from casadi_gnc.campaigns.store import IDENTITY
 from casadi_gnc.embedded.manifest import MANIFEST
 from casadi_gnc.errors import ReportError
 from casadi_gnc.reports import flight_page, records
-from casadi_gnc.reports.style import check_page
+from casadi_gnc.reports.endings import check_page
 from casadi_gnc.tables.wording import cut
 
 

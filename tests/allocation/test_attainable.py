@@ -18,7 +18,7 @@ from casadi_gnc.allocation.attainable_plots import outline, plot_slices
 from casadi_gnc.allocation.attainable_sets import SetKind, attainable_sets
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.allocation.zonotope import Zonotope
-from casadi_gnc.errors import AllocationError
+from casadi_gnc.errors import AllocationError, ProblemError
 from casadi_gnc.mechanics.attitude import frame_rotation
 from casadi_gnc.mechanics.thrusters import ThrusterGeometry
 from casadi_gnc.problem_files.document import read
@@ -480,7 +480,7 @@ def test_pictures(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["three.png", "two.svg"]
     with pytest.raises(AllocationError, match="one row"):
         plot_slices(AllocationProblem([[1.0]], 0.0, 1.0), tmp_path / "one.png")
-    with pytest.raises(AllocationError, match="endings are"):
+    with pytest.raises(ProblemError, match="a picture ends in .png"):
         plot_slices(huang(), tmp_path / "three.doc")
     with pytest.raises(AllocationError, match="2 names"):
         plot_slices(huang(), tmp_path / "three.png", axes_names=("x", "y"))

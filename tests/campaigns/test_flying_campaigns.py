@@ -399,7 +399,7 @@ def test_the_command_flies_shows_and_flies_a_case_again(problem, tmp_path):
     shutil.move(problem, tmp_path / "gone.toml")  # the folder is enough
     shown = json.loads(run("campaign", "show", out, "--json").stdout)
     worst = shown["metrics"]["settling_time"]["worst"][0]
-    flight = run("fly", out, "--case", "worst:settling_time", "--out", tmp_path / "worst", "--json", "--no-plots")
+    flight = run("fly", out, "--case", "worst:settling_time", "--out", tmp_path / "worst", "--json")
     assert flight.returncode == 0, flight.stderr
     value = json.loads(flight.stdout)["schemes"][0]["metrics"]["settling_time"]["value"]
     assert value == worst["value"]

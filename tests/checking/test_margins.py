@@ -153,8 +153,10 @@ def test_command(tmp_path):
     assert one["scheme"] == "pd_pinv"
     assert set(one["channels"]) == {f"{name} {i}" for name in ("torque", "mrp", "rate") for i in (1, 2, 3)}
     assert one["channels"]["torque 1"]["gain_high"] == pytest.approx(one["effort_high"], rel=1e-3)
-    drawn = tmp_path / "m.svg"
-    told = CliRunner().invoke(app, ["margins", "huang2020/slew", "--scheme", "pd_pinv", "--plot", str(drawn)])
+    drawn = tmp_path / "margins.svg"
+    told = CliRunner().invoke(
+        app, ["margins", "huang2020/slew", "--scheme", "pd_pinv", "--figures", str(tmp_path), "--format", "svg"]
+    )
     assert told.exit_code == 0
     assert "…" not in told.stdout
     assert drawn.read_text().startswith("<?xml")

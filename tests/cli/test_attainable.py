@@ -21,8 +21,8 @@ def test_the_papers_limit_is_not_attainable():
 
 
 def test_json_and_picture(tmp_path):
-    picture = tmp_path / "deep" / "sets.png"
-    done = run("--json", "--plot", str(picture))
+    picture = tmp_path / "deep" / "attainable.png"
+    done = run("--json", "--figures", str(picture.parent))
     found = json.loads(done.stdout)
     for kind, expected in (("nominal", 5.16e-4), ("each_vertex", 4.93e-4), ("common_forces", 3.55e-4)):
         assert found["sets"][kind]["box"] == pytest.approx([expected] * 3, rel=2e-3)
@@ -32,6 +32,6 @@ def test_json_and_picture(tmp_path):
 def test_bad_target_is_told(tmp_path):
     blocked = tmp_path / "file"
     blocked.write_text("")
-    done = run("--plot", str(blocked / "p.png"))
+    done = run("--figures", str(blocked / "p"))
     assert done.returncode == 2
     assert "cannot write to the output folder" in done.stderr

@@ -55,7 +55,7 @@ def test_copy_never_overwrites(problem):
 
 def test_fly_writes_signals_summary_and_pictures(problem, tmp_path):
     out = tmp_path / "deep" / "out"
-    done = run("fly", str(problem), "--out", str(out))
+    done = run("fly", str(problem), "--out", str(out), "--figures", str(out))
     assert done.returncode == 0, done.stderr
     names = {path.name for path in out.iterdir()}
     schemes = {"damping_pinv", "observer_pinv", "observer_robust"}
@@ -74,7 +74,7 @@ def test_fly_writes_signals_summary_and_pictures(problem, tmp_path):
 
 
 def test_json_is_the_only_output(problem, tmp_path):
-    done = run("fly", str(problem), "--out", str(tmp_path / "o"), "--scheme", "damping_pinv", "--json", "--no-plots")
+    done = run("fly", str(problem), "--out", str(tmp_path / "o"), "--scheme", "damping_pinv", "--json")
     summary = json.loads(done.stdout)
     assert summary["schemes"][0]["metrics"]["torque_sample_sum"]["value"] > 0
     assert summary["schemes"][0]["made"]["engine"] == "c"
@@ -86,7 +86,7 @@ def test_json_is_the_only_output(problem, tmp_path):
     "options", [("--engine", "vm"), ("--math", "libm"), ("--mode", "continuous"), ("--decimation", "10")]
 )
 def test_fly_options(problem, tmp_path, options):
-    done = run("fly", str(problem), "--out", str(tmp_path / "o"), "--scheme", "observer_pinv", "--no-plots", *options)
+    done = run("fly", str(problem), "--out", str(tmp_path / "o"), "--scheme", "observer_pinv", *options)
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "o" / "summary.json").read_text())["schemes"][0]["made"]
     expected = {"--engine": ("engine", "vm"), "--math": ("maths", "libm"), "--mode": ("mode", "continuous")}
@@ -125,9 +125,7 @@ def test_doctor_tells_what_is_there():
 
 
 def test_without_a_compiler_the_machine_flies_and_says_so(problem, tmp_path):
-    done = run(
-        "fly", str(problem), "--out", str(tmp_path / "o"), "--scheme", "observer_pinv", "--no-plots", PATH="", CC=""
-    )
+    done = run("fly", str(problem), "--out", str(tmp_path / "o"), "--scheme", "observer_pinv", PATH="", CC="")
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "o" / "summary.json").read_text())["schemes"][0]
     assert summary["made"]["engine"] == "vm"
@@ -213,7 +211,6 @@ def test_long_flight_shows_progress_on_a_terminal(tmp_path):
         str(path),
         "--out",
         str(tmp_path / "o"),
-        "--no-plots",
     ]
     with subprocess.Popen([*command, "--scheme", "observer_robust"], stderr=slave, stdout=subprocess.DEVNULL) as flight:
         os.close(slave)

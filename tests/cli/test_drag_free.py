@@ -107,7 +107,7 @@ def test_a_sweep_is_a_table(tmp_path):
 
 def test_sampled_mode_warns_before_it_flies(tmp_path):
     short = CASE.replace("duration_s = 100.0", "duration_s = 0.05")
-    done = fly(tmp_path, short, "--mode", "sampled", "--scheme", "funnels", "--engine", "vm", "--no-plots")
+    done = fly(tmp_path, short, "--mode", "sampled", "--scheme", "funnels", "--engine", "vm")
     assert done.returncode == 0, done.stderr
     warned = done.stderr.strip().splitlines()
     assert len(warned) == 2

@@ -23,7 +23,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess:
 def test_summary_says_how_near_the_chaser_came(tmp_path):
     path = tmp_path / "short.toml"
     path.write_text(PRINTED.replace("duration_s = 250.0", "duration_s = 50.0"), encoding="utf-8")
-    done = run("fly", str(path), "--scheme", "tracking", "--out", str(tmp_path / "out"), "--no-plots")
+    done = run("fly", str(path), "--scheme", "tracking", "--out", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     text = " ".join(done.stdout.split())
     assert "first at 30.59 s: The craft was inside the keep-out sphere of its target." in text
@@ -68,6 +68,6 @@ def test_an_orbit_that_hits_the_earth_is_a_warning_where_it_need_not_be_circular
     path = tmp_path / "falling.toml"
     text = LOW.replace("circular = true\n", "").replace("-6016.869676500585]", "0.0]")
     path.write_text(text.replace("duration_s = 250.0", "duration_s = 1.0"), encoding="utf-8")
-    done = run("fly", str(path), "--out", str(tmp_path / "out"), "--no-plots")
+    done = run("fly", str(path), "--out", str(tmp_path / "out"))
     assert done.returncode == 0, done.stderr
     assert "note: The target's orbit hits the body it is about (6378.14 km): eccentricity 0.87" in done.stdout

@@ -108,7 +108,7 @@ def home(tmp_path_factory):
 def everything(home: Home, package: str) -> None:
     """Check, fly on both engines, generate, verify on the host, fly as a mock-up unit, pickle."""
     home.gnc("check", "mission.toml")
-    summary = json.loads(home.gnc("fly", "mission.toml", "--out", "out", "--json"))
+    summary = json.loads(home.gnc("fly", "mission.toml", "--out", "out", "--figures", "out", "--json"))
     assert summary["schemes"][0]["metrics"]["settling_time"]["value"] == pytest.approx(90.7, abs=0.2)
     assert (home.folder / "out" / "nadir.png").stat().st_size > 10_000
     home.run("python", "-c", COMPARE, str(home.folder / "mission.pickle"))

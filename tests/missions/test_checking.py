@@ -390,7 +390,7 @@ def command(*arguments: str, columns: str = "100") -> subprocess.CompletedProces
 
 
 def test_command_finds_the_slew_as_printed_and_draws(tmp_path):
-    told = command("huang2020/slew_as_printed", "--json", "--plot", str(tmp_path / "checks.png"))
+    told = command("huang2020/slew_as_printed", "--json", "--figures", str(tmp_path))
     assert told.returncode == 1
     assert (tmp_path / "checks.png").stat().st_size > 10_000
     found = {(c["scheme"], c["name"]): c for c in json.loads(told.stdout)["checks"]}
@@ -445,6 +445,6 @@ def test_command_refuses_what_it_cannot_check(tmp_path):
     told = command("huang2020/detumble", "--scheme", "nobody")
     assert told.returncode == 2
     assert "no scheme 'nobody'" in told.stderr
-    told = command("huang2020/detumble", "--plot", str(tmp_path / "a.txt"))
+    told = command("huang2020/detumble", "--figures", str(tmp_path), "--format", "txt")
     assert told.returncode == 2
-    assert "a picture ends in .png" in told.stderr
+    assert "'txt' is not one of 'png', 'svg', 'pdf'" in told.stderr

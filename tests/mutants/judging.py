@@ -93,7 +93,7 @@ def commands(name: str, path: Path, seed: int, folder: Path) -> list[list[str]]:
         return [["read-benchmark", file]]
     found = [["check", file]]
     if draw.random() < 0.1:
-        found.append(["fly", file, "--out", out, "--no-plots", "--decimation", "1000"])
+        found.append(["fly", file, "--out", out, "--decimation", "1000"])
     if draw.random() < 0.1:
         found.append([draw.choice(("schema", "laws", "crafts")), *([file] if draw.random() < 0.8 else [])])
     return found

@@ -76,7 +76,7 @@ def test_the_command_writes_what_the_folder_gives(flown, tmp_path, page):
 
 def test_fly_writes_the_same_page(tmp_path):
     command = [sys.executable, "-m", "casadi_gnc.cli.main"]
-    flying = ["fly", "shi2020/docking", "--scheme", "iobc", "--no-plots", "--out", str(tmp_path / "o")]
+    flying = ["fly", "shi2020/docking", "--scheme", "iobc", "--out", str(tmp_path / "o")]
     done = subprocess.run(
         [*command, *flying, "--report", str(tmp_path / "a.html")], capture_output=True, text=True, timeout=300
     )

@@ -195,9 +195,7 @@ def test_margins_of_a_table_of_cases():
 
 def test_fly_tells_the_verdicts(tmp_path):
     path = file(tmp_path)
-    done = CliRunner().invoke(
-        app, ["fly", str(path), "--scheme", "damping_pinv", "--out", str(tmp_path / "out"), "--no-plots"]
-    )
+    done = CliRunner().invoke(app, ["fly", str(path), "--scheme", "damping_pinv", "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     flat = " ".join(done.output.split())
     assert "ACS-1: The craft comes to rest (settling_time <= 600)" in flat
@@ -304,7 +302,7 @@ def test_check_compares_funnels_with_bounds():
 def test_check_prints_them(tmp_path):
     path = file(tmp_path, '\n[[requirement]]\nid = "A"\nformula = "always(norm(rate) <= 0.01)"\n')
     done = CliRunner().invoke(
-        app, ["check", str(path), "--scheme", "damping_pinv", "--plot", str(tmp_path / "checks.svg")]
+        app, ["check", str(path), "--scheme", "damping_pinv", "--figures", str(tmp_path), "--format", "svg"]
     )
     assert done.exit_code == 1
     assert "fail: requirement.start.A (damping_pinv): No flight can meet the requirement" in done.output
