@@ -16,7 +16,7 @@ from casadi_gnc import allocation
 from casadi_gnc.laws.disturbance_observer import DisturbanceObserver
 from casadi_gnc.laws.performance_funnel import PerformanceFunnel
 from casadi_gnc.mechanics import attitude
-from casadi_gnc.reports.style import COLOURS, FONT, plain, save
+from casadi_gnc.system.pictures import COLOURS, FONT, plain, save
 
 
 def panels(count: int, height: float = 3.4) -> tuple[Figure, list]:
