@@ -14,7 +14,7 @@ from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
     from casadi_gnc.tuning.broken_case import Break, Moved
-    from casadi_gnc.tuning.falsifying import Falsified
+    from casadi_gnc.tuning.falsified import Falsified
 
 
 class Within(str, Enum):

@@ -1,14 +1,15 @@
 """Downhill from a flight: projected quasi-Newton steps, and sampling where a slope leads nowhere.
 
-A step asks for the slope, by differences side by side, and for a few points at once: on the way to where the linearised
-number is least in the set, and along the quasi-Newton direction (BFGS; Nocedal and Wright (2006),
-doi:10.1007/978-0-387-40065-5, section 6.1), moved into the set. Clips, switches and sampled times make
-numbers of flights flat or kinked: where the slope is flat at a small step, it is taken over a tenth of the set; where
-no point on its way is lower, points around are flown instead.
+A step asks for the slope, of one flight there and back or by differences side by side (`slopes`), and for a few points
+at once: on the way to where the linearised number is least in the set, and along the quasi-Newton direction (BFGS;
+Nocedal and Wright (2006), doi:10.1007/978-0-387-40065-5, section 6.1), moved into the set. Clips, switches and sampled
+times make numbers of flights flat or kinked: where the slope is flat at a small step, or no point on its way is lower,
+it is taken over a tenth of the set; where no slope leads on, points around are flown instead.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,9 @@ from casadi_gnc.tuning.reach import Reach
 #: Steps of differences, in standard units: a small one, and one for numbers that go in stairs.
 _STEPS = (0.02, 0.3)
 #: A coordinate whose slope is below this part of the largest tells nothing.
-_TELLING = 0.05
+TELLING = 0.05
 #: Most steps of a descent.
-_MOST = 12
+MOST = 12
 #: Parts of the way to the linearised least, first alone and then together; the last where none of them is lower.
 _WAYS = ((1.0,), (0.5, 0.25, 0.1), (0.03, 0.01))
 #: A descent ends where a step gains less than this part of the nominal robustness.
@@ -31,23 +32,27 @@ _GAIN = 0.002
 
 @dataclass
 class Effort:
-    """Count what a search tried."""
+    """Count what a search tried: flights of a plan, descents, slopes of both kinds, and samplings without one."""
 
     plan: int = 0
     descents: int = 0
     sampled: int = 0
+    derivatives: int = 0
+    differences: int = 0
 
 
-def probe(flights: Flights, reach: Reach, start: Trial) -> Trial:
+def probe(flights: Flights, reach: Reach, start: Trial, effort: Effort) -> Trial:
     """Return the lower of a flight and that where its linearised number is least: a slope, and one flight."""
-    slope = _slope(flights, start, None)
+    slope = next(slopes(flights, start, None, effort), None)
     if slope is None:
         return start
     found = flights.best(start.of, reach.lowest(slope, start.point)[None, :])
     return flights.note("descent", found) if found.value < start.value else start
 
 
-def descend(flights: Flights, reach: Reach, start: Trial, scale: float, seed: int, effort: Effort) -> Trial:
+def descend(
+    flights: Flights, reach: Reach, start: Trial, scale: float, seed: int, effort: Effort, most: int = MOST
+) -> Trial:
     """Return the lowest flight that a descent finds; it ends at the first that breaks the requirement.
 
     Parameters
@@ -58,27 +63,24 @@ def descend(flights: Flights, reach: Reach, start: Trial, scale: float, seed: in
     scale : size of the number, such as that at the nominal.
     seed : of the points around, where slopes lead nowhere.
     effort : what is counted.
+    most : steps.
     """
     effort.descents += 1
     now, size = start, reach.space.size
     inverse, before = np.eye(size), None
-    for number in range(_MOST):
+    for number in range(most):
         if now.broken:
             return now
-        slope = _slope(flights, now, None if before is None else before[1])
-        if slope is None:
-            lower = _around(flights, reach, now, seed + number, effort)
-        else:
-            partly = before is not None
+        lower = None
+        for slope in slopes(flights, now, None if before is None else before[1], effort):
             if before is not None:
                 inverse = _updated(inverse, now.point - before[0], slope - before[1])
             before = now.point, slope
             lower = _along(flights, reach, now, slope, inverse)
-            if lower is None and partly:
-                before = None  # with the whole slope once more
-                continue
-            if lower is None:
-                lower, inverse, before = _around(flights, reach, now, seed + number, effort), np.eye(size), None
+            if lower is not None:
+                break
+        else:
+            lower, inverse, before = _around(flights, reach, now, seed + number, effort), np.eye(size), None
         if lower is None:
             return now
         gain = now.value - lower.value
@@ -88,22 +90,42 @@ def descend(flights: Flights, reach: Reach, start: Trial, scale: float, seed: in
     return now
 
 
-def _slope(flights: Flights, at: Trial, before: np.ndarray | None) -> np.ndarray | None:
-    """Return the slope, of the smaller step that has one; None where it is flat, or a flight has no number.
+def slopes(
+    flights: Flights, at: Trial, before: np.ndarray | None, effort: Effort, steps: tuple[float, ...] = _STEPS
+) -> Iterator[np.ndarray]:
+    """Yield slopes at a flight, (p,), one after the other where none before it led on; flat ones and those of flights
+    without a number are left out.
 
-    After a step, coordinates that told nothing before keep their slope: it would cost as many flights to hear it again.
+    The first is that of one flight there and back, where it costs fewer flights than differences and says anything.
+    Then come differences, over the larger step alone where derivatives said what a small one would.
+
+    Parameters
+    ----------
+    before : the slope before a step, by differences: coordinates that told nothing in it keep theirs, for it would cost
+        as many flights to hear it again.
+    steps : of differences.
     """
-    if before is not None:
-        telling = np.abs(before) > _TELLING * np.abs(before).max()
-        slope = flights.slope(at, _STEPS[0], telling)
-        slope = np.where(telling, slope, before)
-        if np.isfinite(slope).all() and slope[telling].any():
-            return slope
-    for step in _STEPS:
+    exact = flights.derivatives(at)
+    if exact is not None:
+        effort.derivatives += 1
+        if _says(exact):
+            yield exact
+            steps = steps[1:]
+    elif before is not None:
+        telling = np.abs(before) > TELLING * np.abs(before).max()
+        effort.differences += 1
+        slope = np.where(telling, flights.slope(at, steps[0], telling), before)
+        if _says(slope) and slope[telling].any():
+            yield slope
+    for step in steps:
+        effort.differences += 1
         slope = flights.slope(at, step)
-        if np.isfinite(slope).all() and slope.any():
-            return slope
-    return None
+        if _says(slope):
+            yield slope
+
+
+def _says(slope: np.ndarray) -> bool:
+    return bool(np.isfinite(slope).all() and slope.any())
 
 
 def _along(flights: Flights, reach: Reach, at: Trial, slope: np.ndarray, inverse: np.ndarray) -> Trial | None:

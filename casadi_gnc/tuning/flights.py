@@ -15,6 +15,8 @@ from casadi_gnc.tuning.journal import Journal
 from casadi_gnc.tuning.objective import Objective, differences
 from casadi_gnc.tuning.space import Space
 
+#: What a flight there and back costs, in flights (`tests/bench/sensitivity_speed.py`: 2.7 to 3.1).
+THERE_AND_BACK = 4
 #: Called as told(flights, flights at most).
 Told = Callable[[int, int], None]
 
@@ -56,6 +58,17 @@ class Build:
                     raise
                 self.why = str(error)
         return np.full(len(rows), math.nan)
+
+    def gradient(self, row: np.ndarray) -> np.ndarray | None:
+        """Return the derivatives of the number of a row by its numbers, (P,), NaN where a flight has none.
+
+        None where the scheme has no derivatives.
+        """
+        try:
+            slopes = self.objective.sensitivities
+        except GncError:  # pulses, or an allocation in Python
+            return None
+        return slopes.at_row(row, seed=self.objective.seed).gradient
 
     def _at(self, rows: np.ndarray) -> np.ndarray:
         """Return the numbers of flights; none where a file of that row would be refused."""
@@ -119,6 +132,8 @@ class Flights:
         self.builds, self.space, self.most = tuple(builds), space, most
         self._journal, self._told = journal, told
         self._asked: set[tuple[int, bytes]] = set()
+        self._turned: set[tuple[int, bytes]] = set()
+        self._without: set[int] = set()
         #: Flights of this process; the rest were in the journal.
         self.flown = 0
         #: The flight of the smallest number so far.
@@ -127,8 +142,8 @@ class Flights:
 
     @property
     def count(self) -> int:
-        """Different flights that the search asked for."""
-        return len(self._asked)
+        """Different flights that the search asked for; a slope there and back counts as `THERE_AND_BACK`."""
+        return len(self._asked) + THERE_AND_BACK * len(self._turned)
 
     def fly(self, of: int, points: np.ndarray) -> np.ndarray:
         """Return the numbers at points, (n, p), of a build, (n,); inf where there is none that is finite or below.
@@ -162,6 +177,36 @@ class Flights:
         values = self.fly(of, points)
         place = int(np.argmin(values))
         return Trial(of, np.asarray(points)[place], float(values[place]))
+
+    def derivatives(self, at: Trial) -> np.ndarray | None:
+        """Return the slope at a flight there and back, (p,), NaN where it has no number.
+
+        None where as few coordinates move that differences cost no more flights, and of a build without derivatives.
+
+        Raises
+        ------
+        SpentError
+            Where the budget does not allow it.
+        """
+        moved = ~(self.space.discrete | np.isnan(at.point))
+        if moved.sum() <= THERE_AND_BACK or at.of in self._without or not math.isfinite(at.value):
+            return None
+        (row,) = self.space.rows(at.point[None, :])
+        fresh = (at.of, row.tobytes()) not in self._turned
+        if fresh and self.count + THERE_AND_BACK > self.most:
+            raise SpentError
+        gradient = self._journal.gradient(at.of, row)
+        if gradient is None:
+            gradient = self.builds[at.of].gradient(row)
+            if gradient is None:
+                self._without.add(at.of)
+                return None
+            self._journal.note_gradient(at.of, row, gradient)
+            self.flown += THERE_AND_BACK
+        self._turned.add((at.of, row.tobytes()))
+        if self._told and fresh:
+            self._told(self.count, self.most)
+        return self.space.slope(at.point, gradient)
 
     def slope(self, at: Trial, step: float, only: np.ndarray | None = None) -> np.ndarray:
         """Return the slope at a flight by differences of one side, (p,), 0 where it is not in `only`, a mask, (p,).

@@ -34,9 +34,8 @@ class Journal:
 
     def __init__(self, identity: dict[str, Any], place: Path | None = None) -> None:
         self._known: dict[tuple[int, bytes], float] = {}
+        self._gradients: dict[tuple[int, bytes], np.ndarray] = {}
         self._place = place
-        #: Numbers that the file had already.
-        self.read = 0
         if place is None:
             return
         prepare_folder(place.parent)
@@ -52,7 +51,6 @@ class Journal:
                 place.write_text(first + "\n", encoding="utf-8")
         except OSError as error:
             raise CampaignError(f"cannot write to {str(place)!r}: {error.strerror or error}") from error
-        self.read = len(self._known)
 
     def _take(self, lines: list[str], first: str) -> None:
         if lines[0] != first:
@@ -63,6 +61,9 @@ class Journal:
         try:
             for line in lines[1:]:
                 told = json.loads(line)
+                if "gradient" in told:
+                    self._gradients[told["of"], _words(told["row"])] = np.array(told["gradient"], dtype=float)
+                    continue
                 for row, value in zip(told["rows"], told["values"], strict=True):
                     self._known[told["of"], _words(row)] = float(value)
         except (ValueError, KeyError, TypeError) as error:
@@ -80,13 +81,24 @@ class Journal:
         """Keep the numbers of rows."""
         for row, value in zip(rows, values, strict=True):
             self._known[of, _words(row)] = float(value)
-        if self._place is None or not len(rows):
+        if len(rows):
+            self._write({"of": of, "rows": rows.tolist(), "values": _told(values)})
+
+    def gradient(self, of: int, row: np.ndarray) -> np.ndarray | None:
+        """Return the derivatives of a row's number by its numbers, (P,), None where they are not known."""
+        return self._gradients.get((of, _words(row)))
+
+    def note_gradient(self, of: int, row: np.ndarray, gradient: np.ndarray) -> None:
+        """Keep the derivatives of a row's number."""
+        self._gradients[of, _words(row)] = gradient
+        self._write({"of": of, "row": row.tolist(), "gradient": _told(gradient)})
+
+    def _write(self, told: dict[str, Any]) -> None:
+        if self._place is None:
             return
-        told = [value if math.isfinite(value) else str(value) for value in map(float, values)]
-        line = json.dumps({"of": of, "rows": rows.tolist(), "values": told}, allow_nan=False) + "\n"
         try:
             with self._place.open("a", encoding="utf-8") as file:
-                file.write(line)
+                file.write(json.dumps(told, allow_nan=False) + "\n")
                 file.flush()
                 os.fsync(file.fileno())
         except OSError as error:
@@ -98,3 +110,7 @@ class Journal:
 
 def _words(row: Any) -> bytes:
     return np.ascontiguousarray(row, dtype=float).tobytes()
+
+
+def _told(values: np.ndarray) -> list[float | str]:
+    return [value if math.isfinite(value) else str(value) for value in map(float, values)]

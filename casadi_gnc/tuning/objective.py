@@ -28,8 +28,6 @@ from casadi_gnc.tuning.space import Space
 
 #: Step of differences, in standard units.
 STEP = 1e-3
-#: Step of differences of the numbers by the coordinates, which are smooth.
-_TURN = 1e-5
 
 
 class Objective:
@@ -152,15 +150,7 @@ class Objective:
         point = np.asarray(point, dtype=float)
         (row,) = self.space.rows(point[None, :])
         found = self.sensitivities.at_row(row, temperature=temperature, seed=self.seed)
-        moved = np.flatnonzero(~(self.space.discrete | np.isnan(point)))
-        slope = np.zeros(self.size)
-        for i in moved:  # of the numbers by the coordinate: most laws are linear in it, the others smooth
-            ends = np.tile(point, (2, 1))
-            ends[0, i] = min(point[i] + _TURN, self.space.high[i])
-            ends[1, i] = max(point[i] - _TURN, self.space.low[i])
-            ahead, behind = self.space.rows(ends)
-            slope[i] = found.gradient @ (ahead - behind) / (ends[0, i] - ends[1, i])
-        return found.value, slope
+        return found.value, self.space.slope(point, found.gradient)
 
     def _told(self, table: Columns) -> np.ndarray:
         found = np.asarray(table[self.column], dtype=float)

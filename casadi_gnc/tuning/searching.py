@@ -14,15 +14,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from casadi_gnc.campaigns.plans import Sobol
-from casadi_gnc.tuning.descending import Effort, descend, probe
+from casadi_gnc.tuning.descending import MOST, TELLING, Effort, descend, probe
 from casadi_gnc.tuning.flights import Flights, SpentError, Trial
 from casadi_gnc.tuning.reach import Reach
-from casadi_gnc.tuning.space import Space
 
 #: Flights of the first plan, at least.
 _PLAN = 16
 #: Descents after each plan.
 _DESCENTS = 3
+#: Steps of a descent while ends are not flown yet, and in how many parts these are flown.
+_SHORT, _PARTS = 3, 4
 #: Choices, the nominal among them, of each of which a step downhill is taken.
 _BRANCHES = 8
 #: Choices are combined up to so many combinations.
@@ -109,28 +110,44 @@ def _downhill(
     starts = [known[0], *sorted(known[1:], key=lambda each: each.value)][:_BRANCHES]
     lower = []
     for start in starts:
-        lower.append(probe(flights, reach, _moved(flights, start)))
+        lower.append(probe(flights, reach, _moved(flights, start), effort))
         if lower[-1].broken:
             return lower[-1]
-    ends = _ends(flights.space, reach)
-    for start in starts:
-        points = np.where(flights.space.discrete, start.point, ends)
-        lower.append(flights.best(start.of, points))
-        if lower[-1].broken:
-            return flights.note("end", lower[-1])
-    for start in sorted(lower, key=lambda each: each.value)[:_DESCENTS]:
-        found = descend(flights, reach, start, scale, seed, effort)
-        if found.broken:
-            return found
+    parts = [_ends(flights, reach, start) for start in starts]
+    for number in range(_PARTS):
+        fresh = number == 0 and any(len(each[1]) for each in parts)
+        for start, ends in zip(starts, parts, strict=True):
+            if len(ends[number]):
+                fresh = True
+                lower.append(flights.best(start.of, np.where(flights.space.discrete, start.point, ends[number])))
+                if lower[-1].broken:
+                    return flights.note("end", lower[-1])
+        last = number == _PARTS - 1
+        for start in sorted(lower, key=lambda each: each.value)[: _DESCENTS if last else int(fresh)]:
+            found = descend(flights, reach, start, scale, seed, effort, MOST if last else _SHORT)
+            if found.broken:
+                return found
     return None
 
 
-def _ends(space: Space, reach: Reach) -> np.ndarray:
-    """Return the points with one coordinate at its end and all others nominal, (2 (p - choices), p)."""
+def _ends(flights: Flights, reach: Reach, start: Trial) -> list[np.ndarray]:
+    """Return the points with one coordinate at its end and all others nominal, `_PARTS` parts, first to last.
+
+    Together they are (2 (p - choices), p). The first part is empty; then come those downhill, those uphill of
+    coordinates that tell something, and the rest. Where no derivatives tell which is which, all are in the last.
+    """
+    space = flights.space
     moved = np.flatnonzero(~space.discrete)
     places, found = np.arange(len(moved)), np.tile(space.start, (2 * len(moved), 1))
     found[places, moved], found[len(moved) + places, moved] = reach.ends[moved], -reach.ends[moved]
-    return reach.nearest(found)
+    found = reach.nearest(found)
+    slope = flights.derivatives(_moved(flights, start))
+    if slope is None:
+        return [found[:0]] * (_PARTS - 1) + [found]
+    part = np.full((2, len(moved)), 3)
+    part[:, np.abs(slope[moved]) > TELLING * np.abs(slope).max()] = 2
+    part[0, slope[moved] < 0] = part[1, slope[moved] > 0] = 1
+    return [found[part.ravel() == number] for number in range(_PARTS)]
 
 
 def _moved(flights: Flights, at: Trial) -> Trial:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from casadi_gnc.campaigns.plans import Sobol
-from casadi_gnc.tuning.descending import Effort
+from casadi_gnc.tuning.descending import Effort, slopes
 from casadi_gnc.tuning.flights import Flights, SpentError, Trial
 from casadi_gnc.tuning.reach import Reach
 
@@ -79,9 +79,10 @@ def _closer(flights: Flights, reach: Reach, at: Trial, seed: int, effort: Effort
     length = float(np.sqrt(away @ away))
     if not length > 0 or np.isnan(length):
         return None
-    slope = flights.slope(at, 0.02) / units
     directions = []
-    if np.isfinite(slope).all() and slope.any():
+    slope = next(slopes(flights, at, None, effort, (0.02,)), None)
+    if slope is not None:
+        slope = slope / units
         size = float(slope @ slope)
         nearest = (float(slope @ away) - at.value) / size * slope
         ways = [(1.0 - turn) * away + turn * nearest for turn in _TURNS]

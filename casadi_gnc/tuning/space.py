@@ -32,6 +32,8 @@ from casadi_gnc.mathematics import normal
 
 #: Standard deviations of a uniform number in its half width.
 _OF_UNIFORM = math.sqrt(3.0)
+#: Step of differences of the numbers by the coordinates, which are smooth.
+_TURN = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +148,20 @@ class Space:
         for group in self.groups:
             own = blank[:, group.dimensions].any(axis=1)
             found[np.ix_(own, np.arange(group.values.start, group.values.stop))] = self.nominal[group.values]
+        return found
+
+    def slope(self, point: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+        """Return derivatives by the coordinates at a point, (p,), from those by the numbers, (P,).
+
+        They are 0 of choices, and of coordinates that are NaN.
+        """
+        found = np.zeros(self.size)
+        for i in np.flatnonzero(~(self.discrete | np.isnan(point))):  # most laws are linear in it, the others smooth
+            ends = np.tile(point, (2, 1))
+            ends[0, i] = min(point[i] + _TURN, self.high[i])
+            ends[1, i] = max(point[i] - _TURN, self.low[i])
+            ahead, behind = self.rows(ends)
+            found[i] = gradient @ (ahead - behind) / (ends[0, i] - ends[1, i])
         return found
 
     def distance(self, points: np.ndarray) -> np.ndarray:

@@ -1,11 +1,12 @@
 """Flights until a planted failure is found: falsify, CMA-ES and Monte Carlo, over seeds.
 
-python tests/bench/falsify_planted.py [--seeds 20] [--compared 5] [--most 1000] [NAME ...]
+python tests/bench/falsify_planted.py [--seeds 20] [--compared 5] [--most 10000] [--dispersed N] [NAME ...]
 
-CMA-ES (Hansen's `cma`, extra `oracles`) searches the same set in the same coordinates, builds evenly in one more, from
-the nominal with a step of a quarter of the set, and is stopped at its first break. Monte Carlo draws from the
-dispersions, builds evenly. The seed is that of the plan, of the samples, and of the
-noise; one with whose noise the planted failure is not in the set is passed over.
+Beside it stands the same search with slopes by differences alone; a slope there and back counts as four flights.
+`--dispersed` keeps the first N dispersions. CMA-ES (Hansen's `cma`, extra `oracles`) searches the same set in the same
+coordinates, builds evenly in one more, from the nominal with a step of a quarter of the set, and is stopped at its
+first break. Monte Carlo draws from the dispersions, builds evenly. The seed is that of the plan, of the samples, and
+of the noise; one with whose noise the planted failure is not in the set is passed over.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest import mock
 
 import numpy as np
 
@@ -105,6 +107,12 @@ def first_break(builds, seed: int):
     return flights, found
 
 
+def by_differences(builds, seed: int) -> int:
+    """Return what the same search flew whose slopes are differences."""
+    with mock.patch("casadi_gnc.tuning.flights.THERE_AND_BACK", 10**9):
+        return first_break(builds, seed)[0].count
+
+
 def flies_as_one(file: Path, flights, found, out: Path) -> bool:
     """Return whether a break, written as a file, flies as one."""
     mission = gnc.load(file)
@@ -125,16 +133,19 @@ def main() -> None:
     asked.add_argument("names", nargs="*", default=[])
     asked.add_argument("--seeds", type=int, default=20)
     asked.add_argument("--compared", type=int, default=5, help="seeds for the others")
-    asked.add_argument("--most", type=int, default=1000)
+    asked.add_argument("--most", type=int, default=10000, help="flights of the others")
+    asked.add_argument("--dispersed", type=int, help="dispersions that are kept; all if left out")
     given = asked.parse_args()
     print("medians; a count that was stopped is a lower bound; seconds and flights in all are of seed 0, all included")
-    print(f"{'':20} p found first  CMA-ES  Monte Carlo  ratios  in all  seconds  re-flown as breaks")
+    print(f"{'':20} p found first differences  CMA-ES  Monte Carlo  ratios  in all  seconds  re-flown as breaks")
+    print(f"flights of falsify at most 1000, of the others {given.most}", flush=True)
     for name in given.names or PLANTED:
         planted = PLANTED[name]
         with TemporaryDirectory() as place:
             folder, rows, others = Path(place), [], []
             began = time.perf_counter()
-            whole = gnc.falsify(planted.write(folder / "whole.toml"), "P", over=planted.over, out=folder / "b.toml")
+            file = planted.write(folder / "whole.toml", dispersed=given.dispersed)
+            whole = gnc.falsify(file, "P", over=planted.over, out=folder / "b.toml")
             took = time.perf_counter() - began
             mission = gnc.load(folder / "whole.toml")
             builds = _builds(mission, mission.schemes[0].name, "P", dict(planted.over), None)
@@ -147,17 +158,17 @@ def main() -> None:
                 if planted.cause and not _exists(builds[0].objective, planted.cause):
                     continue
                 flights, found = first_break(builds, seed)
-                rows.append((flights.count, found is not None))
+                rows.append((flights.count, found is not None, by_differences(builds, seed)))
                 if len(others) < given.compared:
                     others.append((by_cma(plain, seed, given.most), by_monte_carlo(plain, seed, given.most)))
-                    file = planted.write(folder / f"{seed}.toml", seed)
+                    file = planted.write(folder / f"{seed}.toml", seed, given.dispersed)
                     refly += [flies_as_one(file, flights, found, folder / f"broken-{seed}.toml")] if found else []
-        found = sum(broken for _, broken in rows)
-        first = float(np.median([count for count, _ in rows]))
+        found = sum(broken for _, broken, _ in rows)
+        first, differences = (float(np.median([row[i] for row in rows])) for i in (0, 2))
         cma, drawn = (float(np.median(each)) for each in zip(*others, strict=True))
         print(
-            f"{name:20}{builds[0].objective.space.size:2} {found:2}/{len(rows)} {first:5.0f}  {cma:6.0f}  "
-            f"{drawn:11.0f}  {cma / first:.1f}, {drawn / first:.1f}  {whole.flights:6} {took:8.1f}  "
+            f"{name:20}{builds[0].objective.space.size:2} {found:2}/{len(rows)} {first:5.0f} {differences:11.0f}  "
+            f"{cma:6.0f}  {drawn:11.0f}  {cma / first:.1f}, {drawn / first:.1f}  {whole.flights:6} {took:8.1f}  "
             f"{sum(refly)} of {len(refly)}",
             flush=True,
         )

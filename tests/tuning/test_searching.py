@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from casadi_gnc.campaigns import Choice, Normal, Uniform
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.tuning.descending import Effort
-from casadi_gnc.tuning.flights import Flights
+from casadi_gnc.tuning.flights import THERE_AND_BACK, Flights
 from casadi_gnc.tuning.journal import Journal
 from casadi_gnc.tuning.reach import Reach
 from casadi_gnc.tuning.searching import search
@@ -19,17 +20,20 @@ from casadi_gnc.tuning.space import Space
 
 
 class Formula:
-    """A build whose number is a formula of a row."""
+    """A build whose number is a formula of a row, with derivatives by another formula or without."""
 
     changes: dict = {}
     why = ""
 
-    def __init__(self, of):
-        self.of, self.count = of, 0
+    def __init__(self, of, derivatives=None):
+        self.of, self.derivatives, self.count = of, derivatives, 0
 
     def at(self, rows):
         self.count += len(rows)
         return np.array([self.of(row) for row in rows])
+
+    def gradient(self, row):
+        return None if self.derivatives is None else np.array(self.derivatives(row), dtype=float)
 
 
 def space_of(*laws, nominal=None):
@@ -37,9 +41,9 @@ def space_of(*laws, nominal=None):
     return Space(keys, keys, laws, np.zeros(len(laws)) if nominal is None else np.array(nominal, dtype=float))
 
 
-def looked(formulas, space, most=2000, journal=None, **set_of):
+def looked(formulas, space, most=2000, journal=None, derivatives=None, **set_of):
     """Return the flights, the first break, the smallest, the one of fewest dispersions, and the effort."""
-    flights = Flights([Formula(each) for each in formulas], space, journal or Journal({}), most)
+    flights = Flights([Formula(each, derivatives) for each in formulas], space, journal or Journal({}), most)
     reach, effort = Reach(space, **set_of), Effort()
     first = search(flights, reach, 0, effort)
     if first is None:
@@ -62,6 +66,28 @@ def test_a_half_space_is_found_at_once_and_its_nearest_point_is():
     assert space.distance(near.point)[0] == pytest.approx(3.0, rel=0.01)
     assert space.distance(near.point)[0] >= 3.0
     assert np.isnan(few.point).tolist() == [False, True, False, True, True, True]
+
+
+def test_a_half_space_is_found_by_one_slope_there_and_back():
+    along = np.array([3.0, 0.0, -4.0, 0.0, 0.0, 0.0])
+    found = looked([lambda row: 3.0 - along @ row / 5.0], space_of(*[NORMAL] * 6), derivatives=lambda row: -along / 5.0)
+    flights, first, near, _, effort = found
+    assert flights.path[1].flights == 1 + THERE_AND_BACK + 1
+    assert first.broken
+    assert flights.space.distance(near.point)[0] == pytest.approx(3.0, rel=0.01)
+    assert (effort.derivatives > 0, effort.differences) == (True, 0)
+
+
+@pytest.mark.parametrize("wrong", [-1.0, 0.0, math.nan])
+def test_derivatives_that_lead_nowhere_give_way_to_differences(wrong):
+    """The decided side of a switch says nothing of the other: derivatives uphill, flat, or none; a break at z1 = 3."""
+    found = looked(
+        [lambda row: 3.0 - row[0]], space_of(*[NORMAL] * 6), derivatives=lambda row: [wrong * -1.0] + [0.0] * 5
+    )
+    _, first, _, _, effort = found
+    assert first.broken
+    assert effort.derivatives > 0
+    assert effort.differences > 0
 
 
 def test_a_curved_boundary_s_nearest_point_by_its_own_minimum():
@@ -137,21 +163,28 @@ def test_sets_are_what_they_say():
         Reach(space, "box", 9.0)
 
 
-def test_a_search_that_was_killed_goes_on_word_for_word(tmp_path):
+@pytest.mark.parametrize("exact", [False, True])
+def test_a_search_that_was_killed_goes_on_word_for_word(tmp_path, exact):
     """Whatever of the journal is left, a whole number of lines and a torn one, the search ends as it would have."""
 
     def number(row):
         return 3.0 - 0.6 * row[0] - 0.8 * row[1] + 0.05 * row[2] ** 2
 
-    space, place = space_of(*[NORMAL] * 3), tmp_path / "journal"
-    whole, *right = looked([number], space, journal=Journal({"a": 1}, place))[:4]
+    def slope(row):
+        return [-0.6, -0.8, 0.1 * row[2], 0.0, 0.0]
+
+    space, place = space_of(*[NORMAL] * 5), tmp_path / "journal"
+    more = {"derivatives": slope if exact else None}
+    whole, *right = looked([number], space, journal=Journal({"a": 1}, place), **more)[:4]
     lines = place.read_bytes().splitlines(keepends=True)
     assert len(lines) > 5
     for kept in (1, 3, len(lines) - 1):
         place.write_bytes(b"".join(lines[:kept]) + lines[kept][: len(lines[kept]) // 2])
         journal = Journal({"a": 1}, place)
-        flights, *again = looked([number], space, journal=journal)[:4]
-        assert flights.flown == whole.count - journal.read
+        flights, *again = looked([number], space, journal=journal, **more)[:4]
+        told = [json.loads(line) for line in lines[1:kept]]
+        known = sum(THERE_AND_BACK if "gradient" in one else len(one["rows"]) for one in told)
+        assert flights.flown == whole.count - known
         assert flights.path == whole.path
         assert all(np.array_equal(a.point, b.point, equal_nan=True) for a, b in zip(right, again, strict=True))
         assert place.read_bytes() == b"".join(lines)

@@ -57,13 +57,17 @@ class Least(TypedDict):
     moved: list[Moved]
 
 
+@_TOLD
 class Effort(TypedDict):
     """How hard was tried."""
 
     flights: int
+    """A slope by derivatives, a flight there and back, counts as four."""
     flights_at_first_break: int | None
     plan: int
     descents: int
+    slopes_by_derivatives: int
+    slopes_by_differences: int
     sampled_without_slope: int
 
 
