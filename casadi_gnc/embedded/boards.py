@@ -32,6 +32,11 @@ class Target:
     packages: tuple[str, ...]
     folder: Path = Path()
 
+    @property
+    def has_line(self) -> bool:
+        """Tell whether the board writes to a serial line, as `{file}` in `emulator` says; else by semihosting."""
+        return any("{file}" in part for part in self.emulator)
+
     def place(self, name: str) -> Path:
         """Return a source or script of the target: beside its own file, else among the shipped ones."""
         beside = self.folder / name

@@ -87,6 +87,6 @@ PREFIXES = frozenset(_PREFIXES.split())
 
 _BUILDS = """test all all_build install preinstall package package_source help clean edit_cache rebuild_cache
 list_install_components run_tests zero_check depend build debug optimized general vectors measure semihosting
-start_cortex_m start_rv64"""
+start_cortex_m start_rv64 start_ppc64 square_root"""
 #: Targets and words of CMake and make, and files that packages are built with on targets.
 BUILDS = frozenset(_BUILDS.split())

@@ -33,7 +33,7 @@ _DOUBLE = re.compile(
     r"(sin|cos|tan|exp|log|pow|sqrt|fabs|floor|ceil|tanh|atan2?|asin|acos|expm1|log1p|fmod))$"
 )
 #: Numbers at the head of what a program writes, in the order of `enum number` in measure.c.
-_NUMBERS = 8
+_NUMBERS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ def measure(
             return _emulate(image, target, shop, file)
 
         words = written("measure", "words.bin")
-        climbed = np.frombuffer(written("climb", "climb.bin"), np.uint64).astype(int).tolist() if climb else None
+        climbed = _integers(written("climb", "climb.bin"))[1:] if climb else None
         most: int | str = "it was not asked for"
         if prove:
             most = _most_instructions(shop / "measure.elf", ("replay_step", f"{name}_step"), target, shop)
@@ -229,21 +229,28 @@ def _run(command: list[str], target: Target, shop: Path | None = None) -> str:
 
 def _emulate(image: Path, target: Target, shop: Path, file: str) -> bytes:
     """Run an image in the emulator; return what it wrote to a file."""
-    quiet = ["-nographic", "-monitor", "none", "-serial", "none", "-semihosting-config", "enable=on,target=native"]
-    command = [*target.emulator, *quiet, "-kernel", str(image)]
+    quiet = ["-nographic", "-monitor", "none", "-serial", "none"]
+    if not target.has_line:
+        quiet += ["-semihosting-config", "enable=on,target=native"]
+    command = [*(part.replace("{file}", file) for part in target.emulator), *quiet, "-kernel", str(image)]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=PATIENCE, cwd=shop, stdin=subprocess.DEVNULL
         )
     except (OSError, subprocess.SubprocessError) as error:
         raise TargetError(f"target {target.name}: the emulator could not be run: {error}") from error
-    if done.returncode:
+    told, code = b"", done.returncode
+    if not code:
+        told = (shop / file).read_bytes()
+    if not code and target.has_line:
+        told, code = told[:-1], told[-1] if told else 3
+    if code:
         meaning = {3: "could not write its results", 4: "stopped with a fault", 5: "had its init refuse"}
         raise TargetError(
-            f"target {target.name}: the program {meaning.get(done.returncode, f'ended with {done.returncode}')}"
+            f"target {target.name}: the program {meaning.get(code, f'ended with {code}')}"
             f"{': ' + done.stderr.strip().splitlines()[0] if done.stderr.strip() else ''}"
         )
-    return (shop / file).read_bytes()
+    return told
 
 
 def _size(objects: list[Path], target: Target) -> tuple[int, int, int]:
@@ -262,14 +269,23 @@ def _read(
     most: int | str,
     climbed: tuple[int, int] | None,
 ) -> Measured:
-    head = np.frombuffer(raw[: 8 * _NUMBERS], np.uint64).astype(int)
-    steps, outputs, empty, init, init_stack, step_stack, state, params = head
-    counts = np.frombuffer(raw[8 * _NUMBERS : 8 * (_NUMBERS + steps)], np.uint64).astype(int)
+    _, steps, outputs, empty, init, init_stack, step_stack, state, params = _integers(raw[: 8 * _NUMBERS])
+    counts = np.array(_integers(raw[: 8 * (_NUMBERS + steps)])[_NUMBERS:])
     rest = raw[8 * (_NUMBERS + steps) :]
-    word = np.dtype(np.uint64 if len(rest) == 8 * steps * outputs else np.uint32)
-    words = np.frombuffer(rest, word).reshape(steps, outputs)
-    dearest = (climbed[0] - int(empty), climbed[1]) if climbed else None
+    wide = len(rest) == 8 * steps * outputs
+    written = np.frombuffer(rest, f"{_order(raw)}u{8 if wide else 4}")
+    words = written.astype(np.uint64 if wide else np.uint32).reshape(steps, outputs)
+    dearest = (climbed[0] - empty, climbed[1]) if climbed else None
     return Measured(
-        words, counts - empty, int(init - empty), int(step_stack), int(init_stack),
-        bound, most, dearest, int(state), int(params), text, data, bss, compiler,
+        words, counts - empty, init - empty, step_stack, init_stack,
+        bound, most, dearest, state, params, text, data, bss, compiler,
     )  # fmt: skip
+
+
+def _order(raw: bytes) -> str:
+    """Return the order of octets of the board that wrote a file: the first number in it is 1."""
+    return "<" if raw[:1] == b"\x01" else ">"
+
+
+def _integers(raw: bytes) -> list[int]:
+    return np.frombuffer(raw, f"{_order(raw)}u8").astype(int).tolist()

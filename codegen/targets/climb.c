@@ -2,7 +2,8 @@
  *
  * Search for the dearest step of a package on a board: from samples of its flight on, measurements are changed at random
  * and a change is kept where the step takes as many instructions or more. Writes to the host's file `climb.bin` the most
- * that was found and how many steps were tried, as 64-bit integers.
+ * that was found and how many steps were tried, as 64-bit integers after a 1,
+ * which tells the order of octets.
  */
 #include <string.h>
 
@@ -61,7 +62,7 @@ static uint64_t cost(const replay_word *first, const replay_word *second)
 int main(void)
 {
     const int file = target_open("climb.bin");
-    uint64_t found[2] = {0, 0};
+    uint64_t found[3] = {1, 0, 0};
     int start, k;
     if (replay_init(&params) != 0) return 5;
     for (start = 0; start < STARTS; start++) {
@@ -78,9 +79,9 @@ int main(void)
                 most = spent;
                 memcpy(best, now, sizeof best);
             }
-            found[1]++;
+            found[2]++;
         }
-        found[0] = most > found[0] ? most : found[0];
+        found[1] = most > found[1] ? most : found[1];
     }
     target_write(file, found, sizeof found);
     return 0;

@@ -11,10 +11,15 @@
 #include "target.h"
 
 #define PAINT 0x5au
+/* Below the stack pointer a function may use that much without moving it. */
+#if defined(__powerpc64__)
+#define GAP 512
+#else
 #define GAP 16
+#endif
 
-/* Stack in bytes, below the caller. */
-enum number { STEPS, OUTPUTS, EMPTY_INSTRUCTIONS, INIT_INSTRUCTIONS, INIT_STACK, STEP_STACK, STATE_SIZE,
+/* ORDER is 1 and tells the order of octets; stack in bytes, below the caller. */
+enum number { ORDER, STEPS, OUTPUTS, EMPTY_INSTRUCTIONS, INIT_INSTRUCTIONS, INIT_STACK, STEP_STACK, STATE_SIZE,
               PARAMS_SIZE, NUMBERS };
 
 static replay_state state;
@@ -39,6 +44,8 @@ static unsigned char *stack_pointer(void)
     unsigned char *at;
 #if defined(__arm__)
     __asm__ volatile("mov %0, sp" : "=r"(at));
+#elif defined(__powerpc64__)
+    __asm__ volatile("mr %0, 1" : "=r"(at));
 #else
     __asm__ volatile("mv %0, sp" : "=r"(at));
 #endif
@@ -85,6 +92,7 @@ int main(void)
         numbers[NUMBERS + k] = target_instructions() - before;
         replay_store(&output, rows[k]);
     }
+    numbers[ORDER] = 1;
     numbers[STEPS] = REPLAY_STEPS;
     numbers[OUTPUTS] = REPLAY_OUTPUTS;
     numbers[STEP_STACK] = depth();

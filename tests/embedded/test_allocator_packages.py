@@ -9,6 +9,7 @@ from packages import C99, STRICT, needs_target, run, units
 import casadi_gnc as gnc
 from casadi_gnc.allocation import AllocationStatus, Allocator
 from casadi_gnc.delivery.vectors import read_vectors
+from casadi_gnc.embedded import boards, targets
 from casadi_gnc.errors import GncError
 from casadi_gnc.problem_files.allocation_file import load_allocation
 
@@ -136,10 +137,13 @@ def test_changed_data_are_taken_or_refused_as_a_whole_and_misuse_is_told(package
 @pytest.mark.slow
 @needs_target("cortex-m4f")
 @needs_target("cortex-m7")
+@needs_target("ppc64")
 def test_words_are_the_same_on_targets(tmp_path):
     for real, target in (("float32", "cortex-m4f"), ("float64", "cortex-m7")):
         gnc.generate(written(tmp_path), tmp_path / real, real=real)
         assert gnc.verify(tmp_path / real, [target])["words"] == 0
+        _, expected = read_vectors(tmp_path / real, real)
+        assert (targets.measure(tmp_path / real, "eight", boards.find("ppc64")).outputs == expected).all()
 
 
 @pytest.mark.parametrize(

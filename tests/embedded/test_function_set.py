@@ -158,8 +158,9 @@ def one_of_all() -> ca.Function:
 @needs_target("cortex-m4f")
 @needs_target("cortex-m7")
 @needs_target("rv64")
+@needs_target("ppc64")
 def test_a_function_with_everything_has_the_same_words_on_targets(tmp_path, real):
     gnc.generate(one_of_all(), tmp_path / "all", name="all_of_it", real=real, steps=60)
-    found = gnc.verify(tmp_path / "all", ["cortex-m4f", "cortex-m7", "rv64"])
+    found = gnc.verify(tmp_path / "all", ["cortex-m4f", "cortex-m7", "rv64", "ppc64"])
     assert found["words"] == 0
     assert found["comparisons"][0]["of"] > 60 * 300

@@ -28,14 +28,17 @@ MISSIONS = [
     ("tao2019/case1", "funnels"),
 ]
 HARDWARE = [
-    pytest.param(real, name, marks=needs_target(name))
+    pytest.param(mission, real, name, marks=needs_target(name), id=f"{mission[0]}-{mission[1]}-{real}-{name}")
     for real, name in [
         ("float64", "cortex-m7"),
         ("float64", "rv64"),
+        ("float64", "ppc64"),
         ("float32", "cortex-m4f"),
         ("float32", "cortex-m7"),
         ("float32", "rv64"),
+        ("float32", "ppc64"),
     ]
+    for mission in (MISSIONS if name != "ppc64" else MISSIONS[1:2])
 ]
 
 
@@ -50,8 +53,7 @@ def test_filter_law_and_unloading_of_a_satellite_are_small():
     assert found.instructions.max() <= 6000
 
 
-@pytest.mark.parametrize(("real", "name"), HARDWARE)
-@pytest.mark.parametrize("mission", MISSIONS, ids=lambda mission: mission[0])
+@pytest.mark.parametrize(("mission", "real", "name"), HARDWARE)
 def test_no_word_differs(mission, real, name):
     """1000 samples in closed loop, allocator included, then 24 with bad measurements."""
     target = boards.find(name)
@@ -61,7 +63,8 @@ def test_no_word_differs(mission, real, name):
     assert found.outputs.shape == expected.shape
     assert len(expected) >= 1000
     assert int((found.outputs != expected).sum()) == 0
-    assert (found.data, found.bss) == (0, 0)
+    assert found.data == 0 or name == "ppc64"  # descriptors of functions, and addresses, count as data there
+    assert found.bss == 0
 
 
 @needs_target("cortex-m4f")
