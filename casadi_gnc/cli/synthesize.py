@@ -96,6 +96,8 @@ def _print(title: str, found: dict[str, Any]) -> None:
             typer.echo("  [" + ", ".join(f"{value:.6g}" for value in row) + "]")
     if found.get("norm"):
         typer.echo(f"H-infinity norm: certified {found['promised_norm']:.4g}, true {found['norm']['upper']:.4g}")
+    if found.get("h2_norm"):
+        typer.echo(f"H2 norm: certified {found['h2_norm']['promised']:.4g}, true {found['h2_norm']['upper']:.4g}")
     if found.get("peak"):
         limit = found["peak"]["limit"]
         asked = "no limit given" if limit is None else f"limit {limit:.4g}"
@@ -106,6 +108,8 @@ def _print(title: str, found: dict[str, Any]) -> None:
     if found.get("poles_rad_s"):
         slowest = max(pole[0] for pole in found["poles_rad_s"])
         typer.echo(f"slowest pole: {slowest:.4g} rad/s")
+    for name, depth in found.get("pole_depths_rad_s", {}).items():
+        typer.echo(f"region of poles {name!r}: kept by {depth:.3g} rad/s")
     for one in found["constraints"]:
         typer.echo(f"  {one['name']}: smallest eigenvalue {one['smallest']:.3g}, asked for {one['margin']:.3g}")
 

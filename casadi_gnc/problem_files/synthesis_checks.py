@@ -41,6 +41,33 @@ def check(problem: str | Path) -> tuple[str, list[Check]]:
                 "H-infinity norm by the bounded-real lemma",
             )
         )
+    if found.get("h2_norm"):
+        checks.append(
+            Check(
+                "synthesis.h2_norm",
+                found["h2_norm"]["upper"],
+                found["h2_norm"]["promised"],
+                "-",
+                "fail",
+                "The loop answers the disturbance with more energy than the inequalities promise.",
+                "Do not use these gains; look at how the disturbance and what is priced are modelled.",
+                "H2 norm by Lyapunov's equation, its residual included",
+            )
+        )
+    for name, depth in found.get("pole_depths_rad_s", {}).items():
+        checks.append(
+            Check(
+                f"synthesis.region.{name}",
+                depth,
+                0.0,
+                "rad/s",
+                "fail",
+                "A pole of the closed loop leaves the region that was asked for.",
+                "Do not use these gains.",
+                "eigenvalues of the closed loop",
+                at_least=True,
+            )
+        )
     if found.get("peak") and found["peak"]["limit"] is not None:
         checks.append(
             Check(

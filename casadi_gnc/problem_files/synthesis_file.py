@@ -112,6 +112,11 @@ def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
             "upper": _finite(found.norm.upper),
             "frequency_rad_s": where,
         }
+    if found.energy is not None:
+        told = {"promised": found.energy.promised, "lower": found.energy.lower, "upper": found.energy.upper}
+        data["h2_norm"] = {key: _finite(value) for key, value in told.items()}
+    if found.depths:
+        data["pole_depths_rad_s"] = dict(found.depths)
     if found.peak is not None:
         data["peak"] = {
             "value": _finite(found.peak.value),

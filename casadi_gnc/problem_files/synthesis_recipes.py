@@ -85,6 +85,17 @@ def _one_of_starts(part: Any) -> Any:
     return part
 
 
+Fastest = Annotated[Positive | None, Field(description="largest distance of a pole from zero")]
+Decay = Annotated[NonNegative | None, Field(description="every pole's real part is below minus this number")]
+Damping = Annotated[
+    Annotated[float, Field(gt=0.0, lt=1.0)] | None, Field(description="every pole's damping ratio is above this number")
+]
+Disc = Annotated[
+    Annotated[list[float], Field(min_length=2, max_length=2)] | None,
+    Field(description="centre, on the real axis, and radius of a disc that holds every pole [rad/s]"),
+]
+
+
 class StateFeedback(Recipe):
     """u = -K x with the smallest H-infinity norm from w to z = C x + D u + F w."""
 
@@ -97,7 +108,10 @@ class StateFeedback(Recipe):
     gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
     slack: Positive = 0.02
     margin: Positive = 1e-7
-    fastest_rad_s: Positive | None = Field(default=None, description="largest distance of a pole from zero")
+    fastest_rad_s: Fastest = None
+    decay_1_s: Decay = None
+    damping: Damping = None
+    disc_rad_s: Disc = None
     vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
     half_widths: HalfWidths = None
     limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
@@ -111,6 +125,37 @@ class StateFeedback(Recipe):
         return synthesis.state_feedback(**self.arguments(), backend=backend)
 
 
+class MixedStateFeedback(Recipe):
+    """u = -K x with the smallest H2 norm from w2 to z2 = C2 x + D2 u that keeps the H-infinity norm from w to z."""
+
+    A: Table
+    B: Table
+    E: Table
+    C: Table
+    D: Table
+    F: Table | None = None
+    E2: Table | None = Field(default=None, description="of w2, E if left out")
+    C2: Table
+    D2: Table
+    gamma: Positive = Field(description="bound on the H-infinity norm")
+    margin: Positive = 1e-7
+    fastest_rad_s: Fastest = None
+    decay_1_s: Decay = None
+    damping: Damping = None
+    disc_rad_s: Disc = None
+    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
+    half_widths: HalfWidths = None
+    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
+
+    @model_validator(mode="after")
+    def _starts(self) -> MixedStateFeedback:
+        return _one_of_starts(self)
+
+    def run(self, backend: Any) -> Synthesis:
+        """Return the gains with their certificate."""
+        return synthesis.mixed_state_feedback(**self.arguments(), backend=backend)
+
+
 class Observer(Recipe):
     """L of an observer with the smallest H-infinity norm from w to G times the error."""
 
@@ -122,7 +167,10 @@ class Observer(Recipe):
     gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
     slack: Positive = 0.02
     margin: Positive = 1e-7
-    fastest_rad_s: Positive | None = Field(default=None, description="largest distance of a pole from zero")
+    fastest_rad_s: Fastest = None
+    decay_1_s: Decay = None
+    damping: Damping = None
+    disc_rad_s: Disc = None
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
@@ -139,6 +187,9 @@ class InputEllipsoid(Recipe):
     limit: Positive
     decay_1_s: NonNegative
     per_channel: bool = False
+    fastest_rad_s: Fastest = None
+    damping: Damping = None
+    disc_rad_s: Disc = None
     margin: Positive = 1e-7
 
     @model_validator(mode="after")
@@ -201,6 +252,7 @@ REGISTRY = Registry(
     "casadi_gnc.synthesis_recipes",
     {
         "state_feedback": f"{__name__}:StateFeedback",
+        "mixed_state_feedback": f"{__name__}:MixedStateFeedback",
         "observer": f"{__name__}:Observer",
         "input_ellipsoid": f"{__name__}:InputEllipsoid",
         "intermediate_observer": f"{__name__}:IntermediateObserver",

@@ -15,18 +15,22 @@
 from casadi_gnc.synthesis.analysis import Norm, h_infinity_norm, poles, stable_ratios
 from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus
 from casadi_gnc.synthesis.certificate import Check
+from casadi_gnc.synthesis.energy import Energy, h_two_norm
 from casadi_gnc.synthesis.gains import GainStatus, Synthesis
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.peak import Peak, box_vertices, peak_command
-from casadi_gnc.synthesis.proofs import Infeasibility, Ray
+from casadi_gnc.synthesis.proofs import Infeasibility
+from casadi_gnc.synthesis.rays import Ray
 from casadi_gnc.synthesis.recipes.input_ellipsoid import input_ellipsoid
 from casadi_gnc.synthesis.recipes.intermediate_observer import intermediate_observer, sample_s
+from casadi_gnc.synthesis.recipes.mixed_state_feedback import mixed_state_feedback
 from casadi_gnc.synthesis.recipes.observer import observer
 from casadi_gnc.synthesis.recipes.state_feedback import state_feedback
 from casadi_gnc.synthesis.unknowns import block_matrix
 
 __all__ = [
     "Check",
+    "Energy",
     "GainStatus",
     "Infeasibility",
     "LmiAnswer",
@@ -39,8 +43,10 @@ __all__ = [
     "block_matrix",
     "box_vertices",
     "h_infinity_norm",
+    "h_two_norm",
     "input_ellipsoid",
     "intermediate_observer",
+    "mixed_state_feedback",
     "observer",
     "peak_command",
     "poles",

@@ -10,16 +10,9 @@ import numpy as np
 from casadi_gnc.errors import SynthesisError, offer
 from casadi_gnc.synthesis.backends import Claim, Found
 from casadi_gnc.synthesis.certificate import Check, check, onto_equalities
-from casadi_gnc.synthesis.proofs import (
-    Infeasibility,
-    Ray,
-    Reach,
-    bound,
-    covers,
-    promising,
-    prove_infeasible,
-    prove_unbounded,
-)
+from casadi_gnc.synthesis.objective_bound import bound
+from casadi_gnc.synthesis.proofs import Infeasibility, Reach, covers, promising, prove_infeasible
+from casadi_gnc.synthesis.rays import Ray, prove_unbounded
 from casadi_gnc.synthesis.scaling import Scaled
 
 _GAP = 1e-4  # of the objective's terms: what counts as optimal; SCS reaches about 1e-6
@@ -126,7 +119,10 @@ class LmiAnswer:
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Hold what we make of what a solver found; fields as in `LmiAnswer`."""
+    """Hold what we make of what a solver found; fields as in `LmiAnswer`.
+
+    `excluded` marks an undecided one whose multipliers exclude all points of ordinary size, but no proof was asked for.
+    """
 
     status: LmiStatus
     point: np.ndarray
@@ -136,23 +132,30 @@ class Verdict:
     infeasibility: Infeasibility | None = None
     ray: Ray | None = None
     least: float = float("-inf")
+    excluded: bool = False
+
+    @property
+    def is_lacking(self) -> bool:
+        """Whether another look may be worth more: neither a point that holds nor a reason to believe in none."""
+        return self.status in (LmiStatus.NOT_CERTIFIED, LmiStatus.UNDECIDED) and not self.excluded
 
     @property
     def rank(self) -> tuple[int, float]:
         """Order verdicts: proofs, then points that hold, the smaller gap first, then points that lack least."""
-        if self.status in (LmiStatus.INFEASIBLE, LmiStatus.UNBOUNDED, LmiStatus.CERTIFIED):
+        if self.excluded or self.status in (LmiStatus.INFEASIBLE, LmiStatus.UNBOUNDED, LmiStatus.CERTIFIED):
             return 3, 0.0
         if self.status is LmiStatus.FEASIBLE:
             return 2, -self.gap
         return (1, -max(one.lacking for one in self.checks)) if self.checks else (0, 0.0)
 
 
-def judge(scaled: Scaled, found: Found, within: Reach | None = None) -> Verdict:
+def judge(scaled: Scaled, found: Found, within: Reach | None = None, *, prove: bool = True) -> Verdict:
     """Return what a solver's answer is worth; its claim only says which proof to try first.
 
     Parameters
     ----------
     within : range of the unknowns that a proof of infeasibility has to cover; see `Lmis.solve`.
+    prove : whether to seek a proof of infeasibility where multipliers promise one, or to note that they do.
     """
     data, nothing = scaled.data, np.full(len(scaled.cost), np.nan)
     if found.claim is Claim.UNBOUNDED:
@@ -160,6 +163,8 @@ def judge(scaled: Scaled, found: Found, within: Reach | None = None) -> Verdict:
         if ray is not None:
             return Verdict(LmiStatus.UNBOUNDED, nothing, ray=ray)
     if found.claim is Claim.INFEASIBLE:
+        if not prove and promising(scaled, found.dual):
+            return Verdict(LmiStatus.UNDECIDED, nothing, excluded=True)
         return _refuted(scaled, found, within) or Verdict(LmiStatus.UNDECIDED, nothing)
     if np.shape(found.point) != np.shape(scaled.cost) or not np.all(np.abs(found.point) <= _LARGEST):
         return Verdict(LmiStatus.UNDECIDED, nothing)
@@ -167,7 +172,10 @@ def judge(scaled: Scaled, found: Found, within: Reach | None = None) -> Verdict:
     point = scaled.original(y)
     checks = check(data, point)
     if not all(one.holds for one in checks):
-        refuted = _refuted(scaled, found, within) if promising(scaled, found.dual) else None
+        promised = promising(scaled, found.dual)
+        if promised and not prove:
+            return Verdict(LmiStatus.UNDECIDED, nothing, excluded=True)
+        refuted = _refuted(scaled, found, within) if promised else None
         if refuted is not None and refuted.status is LmiStatus.INFEASIBLE:
             return refuted
         proof = None if refuted is None else refuted.infeasibility

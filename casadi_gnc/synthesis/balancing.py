@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 _SMALL = 1e-8  # of a weight's mean: what is added so that it is definite
+_FLOOR = 1e-6  # of the mean variance: what is added to each state's
 _STEPS, _ABOVE = 16, 1.03  # of bisection for gamma; how far above the last one P is taken
 
 
@@ -80,3 +81,24 @@ def _units(A: np.ndarray) -> np.ndarray:
 def _definite(weight: np.ndarray) -> np.ndarray:
     mean = float(np.trace(weight)) / len(weight)
     return weight + _SMALL * (mean if mean > 0 else 1 / _SMALL) * np.eye(len(weight))
+
+
+def covariance_root(A: np.ndarray, B: np.ndarray, E: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Return T^-1, (n, n), so that T x has a covariance near one, of the regulator's loop with white noise on E.
+
+    Arguments are as of `balanced`. Where nothing stabilises the plant T is diagonal.
+    """
+    from scipy.linalg import solve_continuous_lyapunov
+
+    units = _units(A)
+    a, b, e, c = A / units[:, None] * units, B / units[:, None], E / units[:, None], C * units
+    P = _riccati(a, b, e, c, D, np.inf)
+    if P is None:
+        return np.diag(units)
+    loop = a - b @ np.linalg.solve(_definite(D.T @ D), b.T @ P + (c.T @ D).T)
+    X = solve_continuous_lyapunov(loop, -e @ e.T)
+    X = (X + X.T) / 2 + _FLOOR * float(np.trace(X)) / len(X) * np.eye(len(X))
+    try:
+        return units[:, None] * np.linalg.cholesky(X)
+    except np.linalg.LinAlgError:
+        return np.diag(units)

@@ -99,6 +99,11 @@ class ConicData:
                 right[block.rows] -= block.margin
         return right
 
+    @property
+    def names(self) -> list[str]:
+        """Return the name of the unknown that each scalar unknown belongs to, (N,)."""
+        return [label.split("[")[0] for label in self.labels]
+
     def without(self, names: set[str]) -> ConicData:
         """Return the data without some constraints."""
         kept = [block for block in self.blocks if block.name not in names]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -11,7 +12,9 @@ import numpy as np
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.analysis import Norm, fits, matrices, poles, stable_ratios
 from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus
+from casadi_gnc.synthesis.energy import Energy
 from casadi_gnc.synthesis.peak import Peak, peak_command
+from casadi_gnc.synthesis.regions import Region
 
 #: Poles faster than this multiple of the plant's own rates: the gain runs to infinity.
 RUNAWAY = 1e4
@@ -28,6 +31,8 @@ class GainStatus(Enum):
     NOT_CERTIFIED = "The solver's answer does not keep the inequalities; no gain is returned."
     UNSTABLE = "The closed loop has a pole that is not in the left half plane."
     NORM_EXCEEDED = "The closed loop's H-infinity norm is larger than the certified bound."
+    ENERGY_EXCEEDED = "The closed loop's H2 norm is larger than the certified bound."
+    POLES_OUTSIDE = "A pole of the closed loop lies outside a region that was asked for."
     INPUT_EXCEEDED = "The simulated command is larger than its limit."
     UNDECIDED = "The solver returned neither gains nor a proof; change units, margins or the back end."
 
@@ -60,6 +65,8 @@ class Synthesis:
     missing : what would bound a gain that runs away.
     smallest : between which the smallest gamma lies: a bound from the multipliers, without margins, and what was
         reached; None where it was not sought.
+    energy : the H2 norm and what was promised of it; None if it was not asked.
+    depths : by region of poles, how deep the poles lie in it, [rad/s]; negative outside.
     """
 
     status: GainStatus
@@ -73,6 +80,8 @@ class Synthesis:
     ratios: tuple[float, float] | None = None
     missing: str = ""
     smallest: tuple[float, float] | None = None
+    energy: Energy | None = None
+    depths: dict[str, float] = field(default_factory=dict)
 
     @property
     def is_certified(self) -> bool:
@@ -94,6 +103,11 @@ class Synthesis:
         if self.status is GainStatus.NORM_EXCEEDED and self.norm is not None:
             where = f"at {self.norm.frequency_rad_s:.3g} rad/s"
             return f"{said} It is {self.norm.upper:.4g} {where}, promised {self.promised:.4g}."
+        if self.status is GainStatus.ENERGY_EXCEEDED and self.energy is not None:
+            return f"{said} It is {self.energy.upper:.4g}, promised {self.energy.promised:.4g}."
+        if self.status is GainStatus.POLES_OUTSIDE:
+            left = ", ".join(f"{name!r} by {-depth:.2g}" for name, depth in self.depths.items() if not depth > 0)
+            return f"{said} It leaves {left} rad/s."
         if self.status is GainStatus.UNSTABLE or self.status is GainStatus.RUNS_AWAY:
             slowest, fastest = self.poles[0], self.poles[np.argmax(np.abs(self.poles))]
             found = f"{said} Slowest pole {slowest:.3g}, fastest {fastest:.3g} rad/s."
@@ -105,6 +119,9 @@ class Synthesis:
 
     def _between(self) -> str:
         """Return a sentence where the smallest gamma, or what else was minimised, is not known well, else nothing."""
+        if self.energy is not None and self.energy.least < (1 - _TOLD) * self.energy.promised:
+            low, high = self.energy.least, self.energy.promised
+            return f" The smallest bound on the H2 norm is not known well: it lies between {low:.4g} and {high:.4g}."
         if np.isnan(self.promised) and self.lmis.gap > _TOLD * abs(self.lmis.objective):
             return f" What was minimised, {self.lmis.objective:.4g}, may be smaller, by up to {self.lmis.gap:.2g}."
         if self.smallest is None or self.smallest[0] >= (1 - _TOLD) * self.smallest[1]:
@@ -126,6 +143,8 @@ def certify_gains(
     *,
     promised: float = float("nan"),
     norm: Norm | None = None,
+    energy: Energy | None = None,
+    regions: Sequence[Region] = (),
     peak: Peak | None = None,
     limit: float = float("nan"),
     parts: tuple[np.ndarray, np.ndarray] | None = None,
@@ -139,11 +158,13 @@ def certify_gains(
     rate : the plant's own, [rad/s], against which a gain that runs away is measured.
     parts : (n, n) twice, the loop is fixed + r scaled for a plant whose input matrix is r times the
         assumed one; see `stable_ratios`.
-    promised, norm, peak, limit, missing : as in `Synthesis`.
+    regions : in which the poles are to lie.
+    promised, norm, energy, peak, limit, missing : as in `Synthesis`.
     """
     if not lmis.status.holds:
         return failed(lmis)
     found = poles(loop) if np.all(np.isfinite(loop)) else np.array([np.nan + 0j])
+    depths = {region.name: min(map(region.depth, found)) for region in regions} if np.all(np.isfinite(found)) else {}
     status = GainStatus.CERTIFIED
     if not np.all(np.isfinite(found)) or found[0].real >= 0:
         status = GainStatus.UNSTABLE
@@ -151,12 +172,18 @@ def certify_gains(
         status = GainStatus.RUNS_AWAY
     elif norm is not None and not norm.upper <= promised:
         status = GainStatus.NORM_EXCEEDED
+    elif energy is not None and not energy.upper <= energy.promised:
+        status = GainStatus.ENERGY_EXCEEDED
+    elif not all(depth > 0 for depth in depths.values()):
+        status = GainStatus.POLES_OUTSIDE
     elif peak is not None and peak.bound > limit:
         status = GainStatus.INPUT_EXCEEDED
     tolerated = None
     if parts is not None and status not in (GainStatus.UNSTABLE, GainStatus.RUNS_AWAY):
         tolerated = stable_ratios(*parts)
-    return Synthesis(status, candidate, lmis, promised, norm, found, peak, limit, tolerated, missing)
+    return Synthesis(
+        status, candidate, lmis, promised, norm, found, peak, limit, tolerated, missing, energy=energy, depths=depths
+    )
 
 
 def peak_from(

@@ -11,21 +11,16 @@ import numpy as np
 
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis import backends
-from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus, Verdict, judge
-from casadi_gnc.synthesis.backends import Claim, Found
+from casadi_gnc.synthesis.answer import LmiAnswer, LmiStatus, Verdict
+from casadi_gnc.synthesis.backends import Found
 from casadi_gnc.synthesis.conic import ConicData, Kind
 from casadi_gnc.synthesis.extraction import Constraint, extract
-from casadi_gnc.synthesis.proofs import Reach, names_of, ray_data
-from casadi_gnc.synthesis.scaling import Scaled, scale, tightened
+from casadi_gnc.synthesis.looks import Looks, first_scaling
+from casadi_gnc.synthesis.proofs import Reach
 from casadi_gnc.synthesis.unknowns import Unknown, as_sx, diagonal_index, symmetric_index, unknown
 
 _FAR = 1e4  # natural sizes beyond which an unknown may run to infinity
 _MOST_SOUGHT = 24  # constraints among which a smallest conflict is sought by leaving out one after another
-
-_MANY = 100  # unknowns from which every further look takes its time
-_TIGHTER = (4.0, 64.0)  # how many times what a point lacks is asked for on top, if the answer does not hold
-_LACKING = (LmiStatus.NOT_CERTIFIED, LmiStatus.UNDECIDED)
-_WORTH_ANOTHER_LOOK = (LmiStatus.FEASIBLE, *_LACKING)  # scaled by the point found
 
 
 class Lmis:
@@ -177,43 +172,29 @@ class Lmis:
                 raise SynthesisError(f"within is {value!r} for {name!r}, expected a positive number")
 
     def attempt(
-        self, data: ConicData, backend: Any = "clarabel", *, within: Reach | None = None, **options: Any
+        self,
+        data: ConicData,
+        backend: Any = "clarabel",
+        *,
+        within: Reach | None = None,
+        prove: bool = True,
+        **options: Any,
     ) -> LmiAnswer:
-        """Return the certified answer to conic data of these unknowns, as `data` returns; `within` as in `solve`."""
-        module = backends.module(backend)
-        scaled = scale(data, middle=len(data.cost) > _MANY)
-        natural = scaled.unit
+        """Return the certified answer to conic data of these unknowns, as `data` returns.
+
+        Parameters
+        ----------
+        within : as in `solve`.
+        prove : whether multipliers that exclude points of ordinary size are made a proof that there is none; without
+            it they end the search undecided, for a caller who asks for the proof later.
+        """
+        scaled = first_scaling(data)
+        looks = Looks(backends.module(backend), within, prove, options)
         try:
-            found = module.solve(scaled, **options)
+            look = looks.best(scaled)
         except TypeError as error:
             raise SynthesisError(f"back end {backend!r}: {error}") from error
-        verdict = judge(scaled, found, within)
-        if verdict.status is LmiStatus.NOT_CERTIFIED and len(data.cost) > _MANY:  # mostly it lacks next to nothing
-            again = module.solve(tightened(scaled, verdict.point / scaled.unit, _TIGHTER[-1]), **options)
-            other = verdict if again.claim is Claim.INFEASIBLE else judge(scaled, again, within)
-            if other.status.holds:
-                verdict, found = other, again
-        if verdict.status in _LACKING:
-            scaled, found, verdict = self._elsewhere(scaled, found, verdict, module, within, options)
-        if verdict.status in _WORTH_ANOTHER_LOOK and np.all(np.isfinite(verdict.point)):
-            by_point = scale(data, verdict.point)
-            second = module.solve(by_point, **options)
-            other = judge(by_point, second, within)
-            if other.rank > verdict.rank:
-                scaled, verdict, found = by_point, other, second
-        for factor in _TIGHTER:
-            if verdict.status not in _LACKING or not np.all(np.isfinite(verdict.point)):
-                break
-            again = module.solve(tightened(scaled, verdict.point / scaled.unit, factor), **options)
-            other = judge(scaled, again, within)
-            if other.status.holds or other.status is LmiStatus.INFEASIBLE:
-                verdict, found = other, again
-        if verdict.status in _LACKING and np.any(data.cost):  # an objective that runs away hides what is in conflict
-            again = module.solve(replace(scaled, cost=np.zeros_like(scaled.cost)), **options)
-            other = judge(scaled, again, within) if again.claim is Claim.INFEASIBLE else verdict
-            if other.status is LmiStatus.INFEASIBLE:
-                verdict, found = other, again
-        return self._answer(data, backend, natural, verdict, found)
+        return self._answer(data, backend, scaled.unit, look.verdict, look.found)
 
     def _answer(self, data: ConicData, backend: Any, natural: np.ndarray, verdict: Verdict, found: Found) -> LmiAnswer:
         far = np.abs(verdict.point) > _FAR * natural
@@ -231,28 +212,8 @@ class Lmis:
             iterations=found.iterations,
             seconds=found.seconds,
             claim=found.claim,
-            far=tuple(dict.fromkeys(names_of(data)[i] for i in np.flatnonzero(far))),
+            far=tuple(dict.fromkeys(data.names[i] for i in np.flatnonzero(far))),
         )
-
-    def _elsewhere(
-        self, scaled: Scaled, found: Found, verdict: Verdict, module: Any, within: Reach | None, options: dict[str, Any]
-    ) -> tuple[Scaled, Found, Verdict]:
-        """Return the better of an answer that proves nothing and what other scaling, or a deeper ray, makes of it."""
-        try:
-            other = scale(scaled.data, middle=len(scaled.cost) <= _MANY)
-        except SynthesisError:  # a margin drowns in that scaling; the one at hand is what there is
-            return scaled, found, verdict
-        second = module.solve(other, **options)
-        judged = judge(other, second, within)
-        if judged.rank > verdict.rank:
-            scaled, found, verdict = other, second, judged
-        if verdict.status in _LACKING and Claim.UNBOUNDED in (found.claim, second.claim):
-            for tried in (scaled, other):
-                deep = module.solve(ray_data(tried), **options).point[:-1]
-                judged = judge(tried, Found(deep, np.full(len(tried.right), np.nan), Claim.UNBOUNDED), within)
-                if judged.status is LmiStatus.UNBOUNDED:
-                    return tried, found, judged
-        return scaled, found, verdict
 
     def _matrices(self, point: np.ndarray) -> dict[str, np.ndarray]:
         found, start = {}, 0

@@ -11,7 +11,8 @@ from scipy.linalg import expm
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.problem_files.document import read
 from casadi_gnc.problem_files.loading import load
-from casadi_gnc.problem_files.synthesis_file import load_synthesis
+from casadi_gnc.problem_files.synthesis_checks import check
+from casadi_gnc.problem_files.synthesis_file import load_synthesis, synthesize
 from casadi_gnc.problem_files.synthesis_into import target_of
 
 PROGRAM = [sys.executable, "-m", "casadi_gnc.cli.main", "synthesize"]
@@ -222,3 +223,72 @@ def test_unknown_back_end_is_told():
     done = run("shi2020/synthesis", "--backend", "magic")
     assert done.returncode == 2
     assert "no LMI back end 'magic'; there is clarabel" in done.stderr
+
+
+MIXED = """
+format = 1
+kind = "synthesis"
+[recipe]
+type = "mixed_state_feedback"
+A = [[0.0, 1.0], [0.0, 0.0]]
+B = [[0.0], [0.05]]
+E = [[0.0], [0.05]]
+C = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]
+D = [[0.0], [0.0], [1.0]]
+C2 = [[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]]
+D2 = [[0.0], [0.0], [1.0]]
+gamma = 1.5
+"""
+
+
+def test_a_mixed_recipe_with_regions_of_poles_is_answered(tmp_path):
+    path = tmp_path / "mixed.toml"
+    path.write_text(MIXED + "damping = 0.9\nfastest_rad_s = 4.0\ndecay_1_s = 0.15\n")
+    found = synthesize(load_synthesis(path))
+    assert found["status"] == "CERTIFIED"
+    assert found["h2_norm"]["lower"] <= found["h2_norm"]["upper"] <= found["h2_norm"]["promised"]
+    assert found["norm"]["upper"] <= found["promised_norm"] == 1.5
+    assert set(found["pole_depths_rad_s"]) == {"fastest pole", "decay", "damping"}
+    for real, imaginary in found["poles_rad_s"]:
+        assert real < -0.15
+        assert -real > 0.9 * np.hypot(real, imaginary)
+    names = {one.name: one.verdict for one in check(path)[1]}
+    assert {"synthesis.h2_norm", "synthesis.region.damping"} < set(names)
+    assert set(names.values()) == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("added", "told"),
+    [
+        ("damping = 1.5", "line 14, recipe.damping: is 1.5, expected a number < 1"),
+        ("disc_rad_s = [1.0]", "recipe.disc_rad_s"),
+        ("decay_1_s = 2.0\nfastest_rad_s = 1.0", "no pole meets both fastest_rad_s and decay_1_s"),
+        ("E2 = [[1.0]]", r"E2 has shape (1, 1), expected (2, 1)"),
+    ],
+)
+def test_regions_of_a_file_that_cannot_be_are_told(tmp_path, added, told):
+    path = tmp_path / "mixed.toml"
+    path.write_text(MIXED + added + "\n")
+    with pytest.raises(ProblemError) as raised:
+        synthesize(load_synthesis(path))
+    assert told in str(raised.value)
+    assert "mixed.toml" in str(raised.value)
+
+
+@pytest.mark.slow
+def test_gains_of_a_mixed_recipe_go_into_a_mission(tmp_path):
+    """Six states and three commands of the docking pair: K of a law that has more gains than the recipe."""
+    plant = load_synthesis("shi2020/synthesis").recipe
+    matrices = {"A": plant.A, "B": plant.B, "E": plant.B}
+    matrices |= {name: np.eye(9)[:, :6].tolist() for name in ("C", "C2")}
+    matrices |= {name: np.eye(9)[:, 6:].tolist() for name in ("D", "D2")}
+    path, mission = tmp_path / "mixed.toml", tmp_path / "docking.toml"
+    lines = [f"{name} = {rows}" for name, rows in matrices.items()]
+    head = MIXED.partition("A =")[0]
+    path.write_text(head + "\n".join([*lines, "gamma = 1.5", "damping = 0.9"]) + "\n")
+    mission.write_text(read("shi2020/docking").text)
+    case = load_synthesis(path)
+    found = synthesize(case)
+    assert found["certified"], found["sentence"]
+    target_of(mission, "iobc").write(case, found["gains"])
+    assert load(mission).scheme("iobc").law.controller_gain.full().tolist() == found["gains"]["K"]

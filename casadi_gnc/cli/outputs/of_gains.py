@@ -108,6 +108,14 @@ class Norm(TypedDict):
     frequency_rad_s: float
 
 
+class EnergyNorm(TypedDict):
+    """What is promised of an H2 norm, and its bounds."""
+
+    promised: float | None
+    lower: float | None
+    upper: float | None
+
+
 @_TOLD
 class Peak(TypedDict):
     """The largest command that follows a start within its bounds."""
@@ -148,9 +156,14 @@ class Synthesis(TypedDict):
     no_point_with_entries_up_to: NotRequired[dict[str, float | None]]
     """Range of each unknown that the proof covers; null: any."""
     promised_norm: NotRequired[float | None]
+    smallest_gamma: NotRequired[list[float | None]]
+    """Between which the smallest bound on the norm lies."""
     poles_rad_s: NotRequired[list[list[float]]]
     """Real and imaginary part."""
     norm: NotRequired[Norm | None]
+    h2_norm: NotRequired[EnergyNorm]
+    pole_depths_rad_s: NotRequired[dict[str, float]]
+    """By region of poles that was asked for, how deep the poles lie in it."""
     peak: NotRequired[Peak | None]
     stable_ratios: NotRequired[list[float | None] | None]
     """Range of (assumed mass)/(true mass); null: without an end."""

@@ -19,6 +19,7 @@ vertices are used themselves; a bound on 1'P1 instead would be wrong (an erratum
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -28,6 +29,7 @@ from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.analysis import fits, matrices
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate
 from casadi_gnc.synthesis.lmis import Lmis
+from casadi_gnc.synthesis.regions import regions
 from casadi_gnc.synthesis.unknowns import block_matrix
 
 _APART = 4  # vertices up to which each has a matrix of its own
@@ -41,6 +43,9 @@ def input_ellipsoid(
     decay_1_s: float,
     *,
     per_channel: bool = False,
+    fastest_rad_s: float | None = None,
+    damping: float | None = None,
+    disc_rad_s: Sequence[float] | None = None,
     margin: float = 1e-7,
     backend: Any = "clarabel",
     **options: Any,
@@ -53,6 +58,7 @@ def input_ellipsoid(
     limit : of the norm of u, or of each channel; positive, in the unit of u.
     decay_1_s : a, at least 0.
     per_channel : whether the limit is one of each channel.
+    fastest_rad_s, damping, disc_rad_s : regions of the poles, see `casadi_gnc.synthesis.regions`.
     margin : of the inequalities, in their units.
     backend, options : see `casadi_gnc.synthesis.backends`.
 
@@ -66,7 +72,7 @@ def input_ellipsoid(
     Raises
     ------
     SynthesisError
-        For wrong shapes, or a limit or decay out of range.
+        For wrong shapes, a limit or decay out of range, and regions of poles that have no point in common.
     """
     A, B, vertices = matrices(A=A, B=B, vertices=vertices)
     n, m = len(A), B.shape[1]
@@ -77,11 +83,15 @@ def input_ellipsoid(
         raise SynthesisError(
             f"limit is {limit} and decay_1_s {decay_1_s}; expected a positive and a non-negative number"
         )
+    asked = regions(decay_1_s, damping, disc_rad_s, fastest_rad_s)
     lmis = Lmis()
     X, W, share = lmis.symmetric("X", n), lmis.rectangular("W", m, n), lmis.scalar("share")
     moved = A @ X - B @ W
     _enclose(lmis, X, vertices, margin)
     lmis.nsd(moved + moved.T + 2 * decay_1_s * X, margin=margin, name="decay")
+    for region in asked:
+        if region.name != "decay":  # which is stated
+            region.pose(lmis, X, moved, margin)
     if per_channel:
         for i in range(m):
             lmis.psd(block_matrix([[share * limit**2, W[i, :]], [X]]), margin=margin, name=f"limit of channel {i}")
@@ -99,6 +109,7 @@ def input_ellipsoid(
         A - B @ K,
         plant_rate(A, B),
         peak=peak_from(A - B @ K, K, vertices, plant_rate(A, B), per_channel=per_channel),
+        regions=asked,
         limit=limit,
         parts=(A, -B @ K),
         missing="Ask for a smaller decay_1_s.",

@@ -30,6 +30,7 @@ import numpy as np
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
 from casadi_gnc.synthesis.answer import LmiAnswer
+from casadi_gnc.synthesis.bisection import least
 from casadi_gnc.synthesis.conic import ConicData
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
@@ -126,31 +127,20 @@ def intermediate_observer(
     poses = [_pose(A, B, C, parts, varpi, s, square, margin) for square in (0.0, 1.0)]
     lmis, zero, one = poses[0], poses[0].data(), poses[1].data()
 
-    def attempt(gamma: float) -> Any:
-        return lmis.attempt(_between(zero, one, gamma**2), backend, **options)
+    def attempt(gamma: float, prove: bool) -> LmiAnswer:
+        return lmis.attempt(_between(zero, one, gamma**2), backend, prove=prove, **options)
 
-    high, low = 1.0, 0.0
-    best = attempt(high)
-    while not best.status.holds:
-        if high >= largest_gamma:
-            return failed(best)
-        low, high = high, 2 * high
-        best = attempt(high)
-    while high - low > relative * high:
-        gamma = np.sqrt(low * high) if low > 0.1 * high else (low + high) / 2
-        trial = attempt(gamma)
-        if trial.status.holds:
-            high, best = gamma, trial
-        else:
-            low = gamma
-    centre = lmis.attempt(_between(zero, one, high**2), "barrier", centre=True)
-    best = centre if centre.status.holds else best
+    found = least(attempt, 1.0, relative, largest_gamma)
+    if not found.answer.status.holds:
+        return failed(found.answer)
+    centre = lmis.attempt(_between(zero, one, found.value**2), "barrier", centre=True)
+    best = centre if centre.status.holds else found.answer
     K, L = np.zeros((m, n)), np.zeros((n, n))
     for part, (states, inputs) in enumerate(parts):
         X1, W, H = (best[_name(one, part, parts)] for one in ("X1", "W", "H"))
         K[np.ix_(inputs, states)] = np.linalg.solve(X1, W.T).T
         L[np.ix_(states, states)] = np.linalg.solve((C[np.ix_(states, states)] @ X1).T, H.T).T
-    return certify_pair(A, B, C, K, L, varpi, best, promised=float(high), vertices=vertices, limit=most)
+    return certify_pair(A, B, C, K, L, varpi, best, promised=found.value, vertices=vertices, limit=most)
 
 
 def certify_pair(

@@ -20,6 +20,7 @@ P and H are those of the error in coordinates of `casadi_gnc.synthesis.balancing
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from casadi_gnc.synthesis.balancing import balanced
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, plant_rate
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.recipes.two_steps import two_steps
+from casadi_gnc.synthesis.regions import regions
 from casadi_gnc.synthesis.unknowns import block_matrix
 
 
@@ -44,6 +46,9 @@ def observer(
     slack: float = 0.02,
     margin: float = 1e-7,
     fastest_rad_s: float | None = None,
+    decay_1_s: float | None = None,
+    damping: float | None = None,
+    disc_rad_s: Sequence[float] | None = None,
     backend: Any = "clarabel",
     **options: Any,
 ) -> Synthesis:
@@ -58,6 +63,7 @@ def observer(
         quarter of slack.
     fastest_rad_s : the error's poles are kept within this distance of zero. Needed where w does not
         disturb all of y: else the gain may run to infinity.
+    decay_1_s, damping, disc_rad_s : further regions of those poles, see `casadi_gnc.synthesis.regions`.
     backend, options : see `casadi_gnc.synthesis.backends`.
 
     Returns
@@ -68,7 +74,7 @@ def observer(
     Raises
     ------
     SynthesisError
-        For wrong shapes.
+        For wrong shapes, and regions of poles that have no point in common.
 
     Examples
     --------
@@ -87,6 +93,7 @@ def observer(
         ("G", G, len(G), n),
     ):
         fits(name, matrix, rows, columns)
+    asked = regions(decay_1_s, damping, disc_rad_s, fastest_rad_s)
     noisy = int(np.linalg.matrix_rank(F))
     missing = f"w disturbs {noisy} of {r} measurements: give the others noise in F, or give fastest_rad_s."
 
@@ -103,9 +110,8 @@ def observer(
             margin=margin,
             name="bounded real",
         )
-        if fastest_rad_s is not None:
-            disc = block_matrix([[fastest_rad_s * P, moved], [fastest_rad_s * P]])
-            lmis.psd(disc, margin=0.1 * margin, name="fastest pole")
+        for region in asked:
+            region.pose(lmis, P, moved, 0.1 * margin)
         return P
 
     def gains_of(answer: LmiAnswer, promised: float) -> Synthesis:
@@ -118,6 +124,7 @@ def observer(
             plant_rate(A, C),
             promised=promised,
             norm=norm,
+            regions=asked,
             missing=missing if noisy < r else "Give fastest_rad_s.",
         )
 

@@ -22,6 +22,7 @@ X and W are those of the state in coordinates of `casadi_gnc.synthesis.balancing
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from casadi_gnc.synthesis.balancing import balanced
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.recipes.two_steps import two_steps
+from casadi_gnc.synthesis.regions import regions
 from casadi_gnc.synthesis.unknowns import block_matrix
 
 
@@ -47,6 +49,9 @@ def state_feedback(
     slack: float = 0.02,
     margin: float = 1e-7,
     fastest_rad_s: float | None = None,
+    decay_1_s: float | None = None,
+    damping: float | None = None,
+    disc_rad_s: Sequence[float] | None = None,
     vertices: Any = None,
     limit: float | None = None,
     backend: Any = "clarabel",
@@ -63,6 +68,7 @@ def state_feedback(
         quarter of slack.
     fastest_rad_s : the closed loop's poles are kept within this distance of zero. Needed where z does
         not hold all of u: else the gain may run to infinity.
+    decay_1_s, damping, disc_rad_s : further regions of the poles, see `casadi_gnc.synthesis.regions`.
     vertices : (V, n), starts from whose hull the peak of the norm of u is simulated; see `box_vertices`.
     limit : of that peak, which the LMIs do not know; larger commands are not certified.
     backend, options : see `casadi_gnc.synthesis.backends`.
@@ -75,7 +81,7 @@ def state_feedback(
     Raises
     ------
     SynthesisError
-        For wrong shapes.
+        For wrong shapes, and regions of poles that have no point in common.
 
     Examples
     --------
@@ -96,6 +102,7 @@ def state_feedback(
     ):
         fits(name, matrix, rows, columns)
     vertices, most = starts(vertices, limit, n)
+    asked = regions(decay_1_s, damping, disc_rad_s, fastest_rad_s)
     priced = int(np.linalg.matrix_rank(D))
     missing = f"z prices {priced} of {m} commands: add rows with the others to D, or give fastest_rad_s."
 
@@ -112,9 +119,8 @@ def state_feedback(
             margin=margin,
             name="bounded real",
         )
-        if fastest_rad_s is not None:
-            disc = block_matrix([[fastest_rad_s * X, moved], [fastest_rad_s * X]])
-            lmis.psd(disc, margin=0.1 * margin, name="fastest pole")
+        for region in asked:
+            region.pose(lmis, X, moved, 0.1 * margin)
         return X
 
     def gains_of(answer: LmiAnswer, promised: float) -> Synthesis:
@@ -127,6 +133,7 @@ def state_feedback(
             plant_rate(A, B),
             promised=promised,
             norm=norm,
+            regions=asked,
             peak=peak_from(A - B @ K, K, vertices, plant_rate(A, B)),
             limit=most,
             parts=(A, -B @ K),

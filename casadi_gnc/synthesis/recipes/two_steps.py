@@ -21,6 +21,32 @@ from casadi_gnc.synthesis.lmis import Lmis
 _FACTOR, _SMALLER = 100.0, 3  # by which a margin is made smaller, and how often
 
 
+def with_small_margins(
+    lmis: Lmis, margin: float, most: float, backend: Any, options: dict[str, Any]
+) -> tuple[LmiAnswer, float]:
+    """Return the answer with margins that cost little of the objective, and the largest of them.
+
+    Parameters
+    ----------
+    lmis : with a positive objective. margin : the largest of its margins.
+    most : share of the objective that the margins may cost; where they cost more they are made smaller.
+    backend, options : of `Lmis.solve`.
+    """
+    answer, data = lmis.solve(backend, **options), lmis.data()
+    for _ in range(_SMALLER):
+        if answer.status.holds and answer.objective - answer.least <= most * answer.objective:
+            break
+        data = replace(data, blocks=tuple(replace(one, margin=one.margin / _FACTOR) for one in data.blocks))
+        try:
+            other = lmis.attempt(data, backend, **options)
+        except SynthesisError:  # below that, rounding would decide
+            break
+        if not other.status.holds or (answer.status.holds and not other.objective < answer.objective):
+            break
+        answer, margin = other, margin / _FACTOR
+    return answer, margin
+
+
 def two_steps(
     pose: Callable[[Lmis, Any, float], Any],
     build: Callable[[LmiAnswer, float], Synthesis],
@@ -52,18 +78,7 @@ def two_steps(
         unknown = smallest.scalar("gamma")
         pose(smallest, unknown, margin)
         smallest.minimize(unknown)
-        answer, data = smallest.solve(backend, **options), smallest.data()
-        for _ in range(_SMALLER):
-            if answer.status.holds and answer.objective - answer.least <= slack / 4 * answer.objective:
-                break
-            data = replace(data, blocks=tuple(replace(one, margin=one.margin / _FACTOR) for one in data.blocks))
-            try:
-                other = smallest.attempt(data, backend, **options)
-            except SynthesisError:  # below that, rounding would decide
-                break
-            if not other.status.holds or (answer.status.holds and not other.objective < answer.objective):
-                break
-            answer, margin = other, margin / _FACTOR
+        answer, margin = with_small_margins(smallest, margin, slack / 4, backend, options)
         if not answer.status.holds:
             return failed(answer)
         least = float(answer["gamma"][0, 0])
