@@ -47,7 +47,14 @@ def gain(
 
 
 def option(note: str, *choices: str, default: Any = dataclasses.MISSING) -> Any:
-    """Declare a choice of a law that a problem file makes: one of some words, or without `choices` true or false."""
+    """Declare a choice of a law that a problem file makes: one of some words, or without `choices` true or false.
+
+    Parameters
+    ----------
+    note : what it decides, in a few words.
+    choices : the words.
+    default : what holds where the file is silent; without one the file must choose.
+    """
     about = {"note": note, "symbol": "", "unit": "", "choices": choices or (True, False)}
     return dataclasses.field(metadata=about, default=default, kw_only=True)
 

@@ -34,7 +34,13 @@ if TYPE_CHECKING:
 
 
 class EffortKeys(Part):
-    """The keys of a [[scheme]] that say how far a law may ask and how what it asks is shared out."""
+    """The keys of a [[scheme]] that say how far a law may ask and how what it asks is shared out.
+
+    Parameters
+    ----------
+    effort_limit : largest magnitude of each row of effort, in its unit; what the actuators make of it if left out.
+    allocation : table of the method, {"method": "pinv"} if left out.
+    """
 
     effort_limit: list[Positive] | None = Field(
         default=None, description="of each row of effort, in its unit; what the actuators make of it if left out"

@@ -59,7 +59,13 @@ class Scheme:
 
 @dataclass(frozen=True, eq=False)
 class Funnel:
-    """Bounds that a mission sets a measured signal, whichever law flies it."""
+    """Bounds that a mission sets a measured signal, whichever law flies it.
+
+    Parameters
+    ----------
+    signal : its name.
+    bounds : walls over time, in the signal's unit.
+    """
 
     signal: str
     bounds: PerformanceFunnel
@@ -67,7 +73,18 @@ class Funnel:
 
 @dataclass(frozen=True)
 class Metric:
-    """One number asked of a flight; kinds are defined in `casadi_gnc.missions.metrics`."""
+    """One number asked of a flight; kinds are defined in `casadi_gnc.missions.metrics`.
+
+    Parameters
+    ----------
+    name : of the number.
+    kind : what is made of the signal.
+    signal : a recorded one, by name.
+    threshold : below which the signal counts as settled or reached, in its unit.
+    after, until : time from which and to which samples count, [s].
+    unit : of the number.
+    norm : of a signal of several elements: the largest magnitude, "max", or the Euclidean length, "two".
+    """
 
     name: str
     kind: MetricKind

@@ -63,13 +63,24 @@ def fly(problem: str | Path | Mission, scheme: str | None = None, **options: Any
 
 
 def fly_all(problem: str | Path | Mission, **options: Any) -> list[Flight]:
-    """Return flights of all schemes of a mission, in order; options as for `fly`."""
+    """Return flights of all schemes of a mission, in order.
+
+    Parameters
+    ----------
+    problem : a mission, a problem file, or the name of a shipped one.
+    options : as for `fly`.
+    """
     with _about(problem):
         return flying.fly_all(mission_of(problem), **options)
 
 
 def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Check]:
     """Return all checks of a mission's schemes, or of one of them, without flying it.
+
+    Parameters
+    ----------
+    problem : a mission, a problem file, or the name of a shipped one.
+    scheme : its name; all of them by default.
 
     Examples
     --------
@@ -82,6 +93,11 @@ def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Chec
 
 def margins(problem: str | Path | Mission, scheme: str | None = None) -> list[SchemeMargins]:
     """Return the stability margins of a mission's schemes, or of one of them, linearised at its target.
+
+    Parameters
+    ----------
+    problem : a mission, a problem file, or the name of a shipped one.
+    scheme : its name; all of them by default.
 
     Raises
     ------

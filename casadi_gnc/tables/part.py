@@ -77,7 +77,13 @@ class MisfitError(ValueError):
 
 
 def table(default: Any = ..., note: str = "") -> Any:
-    """Declare a field of a craft that is a table of its own in a file, [initial], and no key of [spacecraft]."""
+    """Declare a field of a craft that is a table of its own in a file, [initial], and no key of [spacecraft].
+
+    Parameters
+    ----------
+    default : what holds where the file has no such table; without one it must be there.
+    note : what the table is, in a few words.
+    """
     return Field(default, description=note or None, json_schema_extra={"table": True})
 
 

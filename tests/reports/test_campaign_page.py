@@ -106,3 +106,60 @@ def test_quiet_and_legible(browser, page, width, scheme):
         assert sheet.locator("figure.chart").count() >= 8
         legible(sheet, width)
         keep(sheet, f"campaign-{width}-{scheme}")
+
+
+#: Marks of an axis of a chart and its places: [(place, number)], and where the largest dot of a kind lies.
+PLACES = """([chart, kind]) => {
+  const marks = (side) => [...chart.querySelectorAll(`text.${side}:not(.axis)`)].map((one) => [
+    Number(one.getAttribute(side === "middle" ? "x" : "y")) - (side === "end" ? 4 : 0), Number(one.textContent)]);
+  const dots = [...chart.querySelectorAll(`path.${kind}`)].map((one) => one.getAttribute("d")).join("");
+  const places = [...dots.matchAll(/M([-\\d.]+) ([-\\d.]+)h0/g)].map((one) => [Number(one[1]), Number(one[2])]);
+  return { across: marks("middle"), up: marks("end"), places };
+}"""
+
+
+def read(marks, places):
+    """Return numbers at places of an axis, of which the first and the last mark are known."""
+    (a, low), (b, high) = marks[0], marks[-1]
+    return low + (np.asarray(places) - a) * (high - low) / (b - a)
+
+
+@pytest.mark.slow
+@pytest.mark.tools("chromium")
+@pytest.mark.packages("playwright")
+def test_ten_thousand_flights_in_a_browser(browser, detumble, tmp_path):
+    """Flights of a minute: what the page costs depends on their number alone."""
+    mission = replace(detumble.with_timing(duration=60.0), requirements=ASKED)
+    found = campaign(mission, 10_000, scheme="observer_pinv", dispersions=SPREAD, out=tmp_path / "m")
+    page = of_campaign(found, tmp_path / "a.html")
+    assert page.stat().st_size < 5_000_000
+    driver = found.summary()["metrics"]["force_sample_sum"]["drivers"][0]["key"]
+    values, rates = found.column("metric.force_sample_sum"), found.column(driver)
+    worst = np.argsort(-values)[:5]
+    with opened(browser, page) as sheet:
+        assert "10000 flights of 10000 cases" in sheet.locator("#verdict").inner_text()
+        painted = sheet.evaluate("performance.getEntriesByType('paint').map((one) => one.startTime)")
+        assert max(painted) < 1500.0
+        legible(sheet, 1280)
+        keep(sheet, "campaign-of-10000")
+        (chart,) = [
+            one
+            for one in sheet.locator("figure.chart").all()
+            if f"Over {driver}" in one.text_content() and "force sample sum" in one.text_content()
+        ]
+        handle = chart.element_handle()
+        seen = sheet.evaluate(PLACES, [handle, "bad.dots"])
+        drawn = np.array(seen["places"])
+        # A place is rounded to a tenth of a unit of some hundred.
+        wide, high = (float(np.ptp(each)) for each in (rates, values))
+        assert len(drawn) == len(worst)
+        np.testing.assert_allclose(
+            np.sort(read(seen["up"], drawn[:, 1])), np.sort(values[worst]), atol=2e-3 * high, rtol=0
+        )
+        np.testing.assert_allclose(
+            np.sort(read(seen["across"], drawn[:, 0])), np.sort(rates[worst]), atol=2e-3 * wide, rtol=0
+        )
+        # Of the others so many are drawn that they can be told apart; none lies beyond the worst.
+        others = np.array(sheet.evaluate(PLACES, [handle, "quiet.dots"])["places"])
+        assert 2000 < len(others) <= 4000
+        assert read(seen["up"], others[:, 1]).max() <= values.max() + 2e-3 * high
