@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from casadi_gnc.mathematics import elementary
+from casadi_gnc.mathematics.exact import is_number
 
 #: Numerators and denominators of the quantile: middle, tail, far tail; highest power first.
 _MIDDLE = (
@@ -63,6 +66,18 @@ def quantile(probability: np.ndarray) -> np.ndarray:
     return _by_stretches(_quantile, probability)
 
 
+def quantile_of(probability: Any) -> Any:
+    """Return the quantile of one probability, above 0 and below 1: a number, or the expression of a symbol."""
+    if is_number(probability):
+        return float(quantile(np.array(float(probability))))
+    p = ca.SX(probability)
+    q = p - 0.5
+    middle = q * _ratio(_MIDDLE, 0.180625 - q * q)
+    size = ca.sqrt(-ca.log(ca.if_else(q < 0, p, 1.0 - p)))
+    tail = ca.if_else(size <= 5.0, _ratio(_TAIL, size - 1.6), _ratio(_FAR, size - 5.0))
+    return ca.if_else(ca.fabs(q) <= 0.425, middle, ca.if_else(q < 0, -tail, tail))
+
+
 def cumulative(x: np.ndarray) -> np.ndarray:
     """Return the probability that a standard normal number is below x."""
     return _by_stretches(_cumulative, x)
@@ -108,13 +123,13 @@ def _cumulative(x: np.ndarray) -> np.ndarray:
     return np.where(np.isnan(x), np.nan, np.where(y < 0.46875, near, np.where(x < 0.0, tail, 1.0 - tail)))
 
 
-def _ratio(parts: tuple[tuple[float, ...], tuple[float, ...]], x: np.ndarray) -> np.ndarray:
+def _ratio(parts: tuple[tuple[float, ...], tuple[float, ...]], x: Any) -> Any:
     over, under = (_polynomial(coefficients, x) for coefficients in parts)
     return over / under
 
 
-def _polynomial(coefficients: tuple[float, ...], x: np.ndarray) -> np.ndarray:
-    total = np.full(np.shape(x), coefficients[0])
+def _polynomial(coefficients: tuple[float, ...], x: Any) -> Any:
+    total: Any = coefficients[0]
     for coefficient in coefficients[1:]:
         total = total * x + coefficient
     return total

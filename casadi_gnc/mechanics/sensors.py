@@ -25,7 +25,6 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import casadi as ca
-import numpy as np
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics import bounds, exact, normal
@@ -65,7 +64,7 @@ class Sensor:
                 f"{self.name}: a value every {self.period:g} s, expected a whole multiple of the sample period "
                 f"{self.hold:g} s, at least once"
             )
-        if not 0 <= self.dropout < 1:
+        if exact.is_number(self.dropout) and not 0 <= self.dropout < 1:
             raise FlightError(f"{self.name}: the chance of a drop-out is {self.dropout:g}, expected 0 to below 1")
         if not 0 <= self.delay <= LATEST:
             raise FlightError(f"{self.name}: a delay of {self.delay} samples, expected 0 to {LATEST}")
@@ -80,9 +79,14 @@ class Sensor:
         return walk / exact.sqrt(self.hold) if self.hold else 0.0
 
     @property
+    def loses(self) -> bool:
+        """Whether values may not come."""
+        return not exact.is_zero(self.dropout)
+
+    @property
     def is_partial(self) -> bool:
         """Whether there is a signal NAME_valid."""
-        return self.period > 0 or self.dropout > 0
+        return self.period > 0 or self.loses
 
     @property
     def value(self) -> Signal:
@@ -103,7 +107,7 @@ class Sensor:
     @property
     def noise(self) -> Layout:
         """Standard normal numbers."""
-        lost = (Signal(f"{self.name}_dropout"),) if self.dropout > 0 else ()
+        lost = (Signal(f"{self.name}_dropout"),) if self.loses else ()
         return Layout((Signal(f"{self.name}_noise", self.value.size if self.value.size != 4 else 3), *lost))
 
     def start(self) -> dict[str, Any]:
@@ -130,9 +134,9 @@ class Sensor:
         found = {self.value.name: value}
         if self.is_partial:
             flags = [ca.SX(seen), self._due(t)]
-            if self.dropout > 0:
+            if self.loses:
                 # A standard normal number is above the quantile of 1 - p with the chance p.
-                least = float(normal.quantile(np.array(1 - self.dropout)))
+                least = normal.quantile_of(1 - self.dropout)
                 flags.append(getattr(drawn, f"{self.name}_dropout") < least)
             found[f"{self.name}_valid"] = ca.if_else(bounds.all_of(ca.vertcat(*flags)), 1.0, 0.0)
         return found
@@ -223,12 +227,17 @@ class StarTracker(Sensor):
     @property
     def is_partial(self) -> bool:
         """Whether there is a signal NAME_valid."""
-        return super().is_partial or self.max_rate < math.inf
+        return super().is_partial or self._blinds
 
     @property
     def value(self) -> Signal:
         """The quaternion."""
         return Signal(self.name, 4, "-", limit=1.01)
+
+    @property
+    def _blinds(self) -> bool:
+        """Whether some rate is too fast for it."""
+        return not (exact.is_number(self.max_rate) and float(self.max_rate) == math.inf)
 
     @property
     def deviations(self) -> tuple[float, float, float]:
@@ -241,7 +250,7 @@ class StarTracker(Sensor):
         wrong = quaternions.from_rotation_vector(exact.array(self.deviations) * noise)
         tracker = quaternions.compose(wrong, quaternions.compose(mounting, truth.quaternion))
         body = quaternions.compose(quaternions.conjugate(mounting), tracker)
-        slow = ca.sumsqr(truth.rate) <= self.max_rate**2 if self.max_rate < math.inf else 1.0
+        slow = ca.sumsqr(truth.rate) <= self.max_rate**2 if self._blinds else 1.0
         return quaternions.short_way(body), slow
 
 
@@ -337,4 +346,4 @@ class Tachometers(Sensor):
     def read(self, truth: Any, own: Any, noise: Any) -> tuple[Any, Any]:
         """Return the speeds, rounded to the quantum."""
         speed = truth.wheel_speed + self.deviation * noise
-        return (self.quantum * ca.floor(speed / self.quantum + 0.5) if self.quantum else speed), 1.0
+        return (self.quantum * ca.floor(speed / self.quantum + 0.5) if not exact.is_zero(self.quantum) else speed), 1.0

@@ -11,10 +11,14 @@ import casadi as ca
 from casadi_gnc.allocation import Direct
 from casadi_gnc.errors import FlightError
 from casadi_gnc.laws.efforts import TORQUE
-from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.missions.modulated import Modulation
 from casadi_gnc.signals import Layout
 from casadi_gnc.status import StepStatus
+
+#: Why what a robust allocation knows of its actuators stays a number.
+SET_UP = "robust allocation is set up for one effectiveness and one range; take method pinv to vary them"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +31,7 @@ class Actuators:
     Parameters
     ----------
     effectiveness : A, (R, N), effort per command, or a function of the measured signals (by name) that returns it.
-    lower, upper : (N,), amplitude bounds, unit of the actuators.
+    lower, upper : (N,), amplitude bounds, unit of the actuators; numbers, or symbols where they vary from case to case.
     rate : largest change of an actuator per second, `inf` for none.
     effort : what the actuators make together, one signal a kind; R rows.
     reach : function of the measured signals and the sample period that returns further bounds, lower and upper,
@@ -39,8 +43,8 @@ class Actuators:
     """
 
     effectiveness: ca.DM | Callable[[Any], Any]
-    lower: Sequence[float]
-    upper: Sequence[float]
+    lower: Sequence[Any]
+    upper: Sequence[Any]
     rate: float = float("inf")
     effort: Layout = TORQUE
     reach: Callable[[Any, float], tuple[Any, Any]] | None = None
@@ -58,10 +62,12 @@ class Actuators:
                     f"({', '.join(self.effort.names)}) x {len(self.lower)} (actuators)"
                 )
         for name in ("lower", "upper"):
-            object.__setattr__(self, name, [float(value) for value in getattr(self, name)])
+            object.__setattr__(self, name, list(map(_plain, getattr(self, name))))
         if len(self.lower) != len(self.upper):
             raise FlightError(f"{len(self.lower)} lower bounds of actuators, but {len(self.upper)} upper ones")
-        crossed = [i for i, (low, high) in enumerate(zip(self.lower, self.upper, strict=True), 1) if not low <= high]
+        pairs = list(zip(self.lower, self.upper, strict=True))
+        known = [i for i, pair in enumerate(pairs, 1) if all(map(is_number, pair))]
+        crossed = [i for i in known if not self.lower[i - 1] <= self.upper[i - 1]]
         if crossed:
             low, high = self.lower[crossed[0] - 1], self.upper[crossed[0] - 1]
             raise FlightError(f"actuator {crossed[0]}: its lower bound {low:g} exceeds the upper, {high:g}")
@@ -70,12 +76,32 @@ class Actuators:
         """Return the believed effectiveness, (R, N), at the measured signals `seen`."""
         return self.effectiveness(seen) if callable(self.effectiveness) else self.effectiveness
 
-    def most(self) -> list[float]:
+    @property
+    def fixed(self) -> Any:
+        """The effectiveness of an allocator that is set up before the flight, (R, N).
+
+        Raises
+        ------
+        FlightError
+            Where effectiveness or bounds follow the measurement, or vary from case to case.
+        """
+        if callable(self.effectiveness):
+            raise FlightError("the effectiveness follows the measurement; robust allocation needs one that stays")
+        if not all(map(is_number, [self.effectiveness, *self.lower, *self.upper])):
+            raise FlightError(SET_UP)
+        return self.effectiveness
+
+    def most(self) -> list[Any]:
         """Return the largest magnitude of each row of effort that the bounds allow, (R,); of a fixed effectiveness."""
         if callable(self.effectiveness):
             raise FlightError("the effectiveness follows the measurement, so no largest effort follows: give limits")
-        bound = ca.fmax(ca.fabs(ca.DM(self.lower)), ca.fabs(ca.DM(self.upper)))
-        return [float(value) for value in ca.mtimes(ca.fabs(self.effectiveness), bound).nonzeros()]
+        bound = bounds.maximum(ca.fabs(array(self.lower)), ca.fabs(array(self.upper)))
+        return list(map(_plain, ca.mtimes(ca.fabs(self.effectiveness), bound).elements()))
+
+
+def _plain(value: Any) -> Any:
+    """Return a number as Python's own; a symbol as it is."""
+    return float(value) if is_number(value) else value
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +115,14 @@ class Actuation(Actuators):
         `casadi_gnc.allocation`.
     """
 
-    limit_below: Sequence[float] = ()
-    limit_above: Sequence[float] = ()
+    limit_below: Sequence[Any] = ()
+    limit_above: Sequence[Any] = ()
     allocator: Any = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("limit_below", "limit_above"):
-            object.__setattr__(self, name, [float(value) for value in getattr(self, name)])
+            object.__setattr__(self, name, list(map(_plain, getattr(self, name))))
             if len(getattr(self, name)) != self.effort.size:
                 raise FlightError(
                     f"{name} has {len(getattr(self, name))} numbers, expected {self.effort.size}, one for each row of "
@@ -109,7 +135,7 @@ class Actuation(Actuators):
             )
 
     @classmethod
-    def of(cls, actuators: Actuators, limit: Sequence[float], allocator: Any) -> Actuation:
+    def of(cls, actuators: Actuators, limit: Sequence[Any], allocator: Any) -> Actuation:
         """Return the actuation of some actuators, with limits of the same magnitude on both sides."""
         if len(limit) != actuators.effort.size:
             raise FlightError(

@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError
 
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.checks import Check
-from casadi_gnc.errors import FlightError, ProblemError
+from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.describing import shortened
 from casadi_gnc.missions.panel import Panel
@@ -161,11 +161,7 @@ class Craft(Part):
 def _allocator(keys: Pinv | Robust, actuators: Actuators) -> Any:
     if isinstance(keys, Pinv):
         return keys.allocator(None)
-    if callable(actuators.effectiveness):
-        raise FlightError("the effectiveness follows the measurement; robust allocation needs one that stays")
-    problem = AllocationProblem(
-        actuators.effectiveness.full(), lower=actuators.lower, upper=actuators.upper, **keys.weights()
-    )
+    problem = AllocationProblem(actuators.fixed.full(), lower=actuators.lower, upper=actuators.upper, **keys.weights())
     return keys.allocator(problem)
 
 

@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 
 from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.missions import asking
@@ -156,7 +157,7 @@ class Loop:
         layout, accepted, flag = self.plant.measurement, [], ca.SX(0)
         for signal in layout.signals:
             rows = layout.place(signal.name)
-            limit = min(signal.limit, 1e150)
+            limit = min(signal.limit, 1e150) if is_number(signal.limit) else signal.limit
             credible = bounds.all_of(ca.fabs(y[rows]) <= limit)
             # Before there is a good value, or if it was lost, zero is the last resort.
             last = ca.if_else(ca.fabs(good[rows]) <= limit, good[rows], 0.0)
@@ -188,7 +189,7 @@ class Loop:
         kept, lost = self._sound_memory(t, seen, m)
         memory, asked = self.commanded(t, seen, kept)
         wanted = ca.if_else(ca.fabs(asked) <= CREDIBLE, asked, 0.0)
-        below, above = ca.DM(actuation.limit_below), ca.DM(actuation.limit_above)
+        below, above = array(actuation.limit_below), array(actuation.limit_above)
         limited = bounds.clip(wanted, below, above)
         flags = {
             StepStatus.MEASUREMENT_REPLACED: replaced,
@@ -211,7 +212,7 @@ class Loop:
     def box(self, y: Any, previous: Any) -> tuple[Any, Any]:
         """Return the bounds of the actuators in this sample; the amplitude box wins over all others."""
         actuation, period = self.actuation, self.mission.timing.sample_period
-        lower, upper = ca.SX(ca.DM(actuation.lower)), ca.SX(ca.DM(actuation.upper))
+        lower, upper = ca.SX(array(actuation.lower)), ca.SX(array(actuation.upper))
         if actuation.reach is not None:
             least, most = actuation.reach(self.plant.measurement.split(y), period)
             lower, upper = bounds.clip(least, lower, upper), bounds.clip(most, lower, upper)
@@ -247,7 +248,7 @@ class Loop:
     def judgement(self, y: Any, limited: Any, actuators: Any) -> dict[StepStatus, Any]:
         """Return the flags that the flight software raises once it knows what the actuators will do, by bit."""
         actuation = self.actuation
-        limits = bounds.maximum(-ca.DM(actuation.limit_below), ca.DM(actuation.limit_above))
+        limits = bounds.maximum(-array(actuation.limit_below), array(actuation.limit_above))
         missing = ca.fabs(limited - self.made(y, actuators))
         flags = {StepStatus.EFFORT_SHORT: bounds.any_of(missing > SHORTAGE * limits)}
         if actuation.judge is not None:

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from casadi_gnc import guests
 from casadi_gnc.embedded.printer import print_function
-from casadi_gnc.errors import FlightError, GncError
+from casadi_gnc.errors import AllocationError, FlightError, GncError, LawError
 from casadi_gnc.mathematics.exact import array
-from casadi_gnc.missions.actuation import Actuation
+from casadi_gnc.missions.actuation import SET_UP, Actuation
 from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.paths import changed, number_at, numbers_of
 from casadi_gnc.missions.scheme import Scheme
@@ -28,6 +29,9 @@ from casadi_gnc.tables.part import MisfitError, Part
 
 if TYPE_CHECKING:
     from casadi_gnc.missions.mission import Mission
+
+#: Why a number stays a number, where Python decides by it.
+_DECIDED = "a size, a limit or a choice that is made before the flight depends on it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +78,12 @@ class Varied:
 
     @cached_property
     def _believable(self) -> ca.Function:
-        """The function from the parameters to the true inertias, (9 k,), and the first perfect measurement."""
+        """The function from the parameters to true inertias, (9 k,), first perfect measurement, and its limits."""
         plant, p = self.mission.truth, self.parameters.symbols
         inertias = [ca.vec(ca.SX(array(inertia))) for inertia in plant.inertias().values()]
         seen = plant.measure(0.0, ca.vertcat(*self.mission.start), self.mission.quiet())
-        return ca.Function("believable", [p], [ca.densify(ca.vertcat(*inertias, ca.SX(0, 1))), ca.densify(ca.SX(seen))])
+        told = [ca.vertcat(*inertias, ca.SX(0, 1)), ca.SX(seen), ca.SX(array(plant.measurement.limits()))]
+        return ca.Function("believable", [p], list(map(ca.densify, told)))
 
     def refusals(self, values: np.ndarray) -> list[str]:
         """Return for each row of values why no such craft can fly, "" where it can.
@@ -93,9 +98,8 @@ class Varied:
         told = [self._refusal(row) for row in values]
         if not len(values):
             return told
-        inertias, seen = (np.array(each).T.reshape(len(values), -1) for each in self._believable(values.T))
+        inertias, seen, limits = (np.array(each).T.reshape(len(values), -1) for each in self._believable(values.T))
         layout = self.mission.truth.measurement
-        limits = np.concatenate([np.full(s.size, s.limit) for s in layout.signals] or [np.zeros(0)])
         bodies = inertias.reshape(len(values), -1, 3, 3)
         sound = np.zeros(len(values), dtype=bool)
         finite = np.flatnonzero(np.isfinite(bodies).all(axis=(1, 2, 3)))
@@ -109,7 +113,7 @@ class Varied:
             else:
                 row = int(np.flatnonzero(~credible[i])[0])
                 name = next(s.name for s in layout.signals if layout.place(s.name).stop > row)
-                told[i] = f"{name} starts at {seen[i][row]:g}, beyond the largest credible, {limits[row]:g}"
+                told[i] = f"{name} starts at {seen[i][row]:g}, beyond the largest credible, {limits[i][row]:g}"
         return told
 
     def _refusal(self, values: np.ndarray) -> str:
@@ -172,26 +176,37 @@ def _varied(mission: Mission, keys: Sequence[str]) -> Varied:
         made = Varied(mission, varied, Parameters(tuple(keys), column, nominal))
         for tape in made.tapes.functions.values():
             print_function(tape)  # a symbol that Python took for a number is NaN, which has no C form
+    except LawError as error:
+        raise _said(error) from error
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:  # what CasADi and Python say of that
         told = str(error).splitlines()[-1].split(": ", 1)[-1]
-        raise FlightError(
-            f"a size, a limit or a choice that is made before the flight depends on it: {told}"
-        ) from error
+        raise FlightError(f"{_DECIDED}: {told}") from error
+    if _shape(made.mission, made.scheme) != _shape(mission, made.nominal.schemes[0]):
+        raise FlightError("where it is not zero the flight has other signals or steps; write a nominal value above 0")
     return made
+
+
+def _shape(mission: Mission, scheme: Scheme) -> list[tuple[Any, Any]]:
+    """Return who shares the effort out, and name and size of all that a flight carries, draws and records."""
+    plant, law, actuation = mission.truth, scheme.flown, scheme.actuation
+    layouts = (plant.state, plant.noise, plant.inputs, plant.measurement, law.memory, law.outputs)
+    signals = [(signal.name, signal.size) for layout in layouts for signal in layout.signals]
+    return [(type(actuation.allocator), type(actuation.inverse)), *signals]
 
 
 def _with(mission: Mission, values: dict[str, Any]) -> Mission:
     """Return a mission with other numbers, or symbols, at whole paths."""
-    craft, laws = changed(mission, values)
+    craft, laws, every_keys = changed(mission, values)
     parts = Parts(craft)
     schemes = []
     for each in mission.schemes:
         law, actuation, navigation = laws[each.name], each.actuation, each.navigation
-        if craft is not mission.craft and each.keys is not None:  # made by the craft, so made again
-            actuation = _actuation(each.keys, parts)
+        keys = every_keys[each.name]
+        if keys is not None and (craft is not mission.craft or keys is not each.keys):  # made by the craft: again
+            actuation = _actuation(keys, parts)
             law = law if law.belief_kind() is None else replace(law, body=parts.belief)
             navigation = parts.navigation
-        schemes.append(replace(each, law=law, actuation=actuation, navigation=navigation))
+        schemes.append(replace(each, law=law, actuation=actuation, navigation=navigation, keys=keys))
     return replace(mission, craft=craft, schemes=schemes, parts=parts)
 
 
@@ -199,5 +214,15 @@ def _actuation(keys: Part, parts: Parts) -> Actuation:
     """Return how a scheme with these keys makes efforts: as its craft believes."""
     try:
         return parts.actuation(keys)
+    except LawError as error:
+        raise _said(error) from error
+    except AllocationError as error:
+        raise FlightError(SET_UP) from error
     except (GncError, MisfitError) as error:
         raise FlightError(f"the actuators as the flight software knows them follow from it ({error})") from error
+
+
+def _said(error: LawError) -> GncError:
+    """Return what to tell of a failure: that of code which could do with the number is Python deciding by it."""
+    cause = error.__cause__
+    return error if cause is None or isinstance(cause, GncError) else FlightError(_DECIDED + guests.own_lines(cause))

@@ -1,7 +1,8 @@
 """The numbers of a mission by the paths at which a problem file has them: found, read, and put in the place of others.
 
 A path is `truth.inertia_factor`, `initial.rate_rad_per_s.2`, `spacecraft.thrusters.positions_m.3.1` or
-`scheme.observer_pinv.law.rate_gain`; items of lists have their number from 1, and a `*` stands for every item.
+`scheme.observer_pinv.law.rate_gain`; items of lists have their number from 1, and a `*` stands for every item, of a
+table for every key that has numbers.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def _root(mission: Mission, root: str, key: str) -> Any:
     craft = mission.craft
     own = own_tables(type(craft))
     if root == "scheme":
-        return {each.name: {"law": each.law} for each in mission.schemes}
+        return {each.name: {"law": each.law, **_limits(each.keys)} for each in mission.schemes}
     if root == "spacecraft":
         return {name: getattr(craft, name) for name in type(craft).model_fields if name not in own}
     if root in own:
@@ -60,6 +61,11 @@ def _root(mission: Mission, root: str, key: str) -> Any:
 _ROOTS = ("spacecraft", "scheme")
 
 
+def _limits(keys: Part | None) -> dict[str, Any]:
+    """Return the limits among the keys of a scheme."""
+    return {} if keys is None else {name: part for name, part in _parts(keys).items() if name != "allocation"}
+
+
 def _leaves(at: Any, rest: list[str], done: tuple[str, ...], key: str) -> Iterator[str]:
     """Yield the paths of the numbers below a place; a `*` stands for every item there."""
     if rest:
@@ -68,7 +74,8 @@ def _leaves(at: Any, rest: list[str], done: tuple[str, ...], key: str) -> Iterat
             if not parts:
                 raise FlightError(f"{key!r} leads nowhere: {'.'.join(done)} has no parts")
             for name, part in parts.items():
-                yield from _leaves(part, rest[1:], (*done, name), key)
+                if len(rest) > 1 or not isinstance(at, Part) or _holds_numbers(part):
+                    yield from _leaves(part, rest[1:], (*done, name), key)
             return
         if rest[0] not in parts:
             known = near_key(rest[0], list(parts)) or (f"; there is {', '.join(parts)}" if parts else "")
@@ -83,6 +90,13 @@ def _leaves(at: Any, rest: list[str], done: tuple[str, ...], key: str) -> Iterat
             yield from _leaves(part, [], (*done, name), key)
     else:
         raise FlightError(f"{key!r} leads to {'.'.join(done)}, which is no number and no list of numbers")
+
+
+def _holds_numbers(at: Any) -> bool:
+    """Return whether a key of a table has a number or numbers: words, choices and what is left out have none."""
+    if isinstance(at, (list, tuple)):
+        return any(map(_holds_numbers, at))
+    return isinstance(at, (int, float, ca.DM)) and not isinstance(at, bool)
 
 
 def _parts(at: Any) -> dict[str, Any]:
@@ -107,20 +121,25 @@ def number_at(mission: Mission, key: str) -> float:
     return float(place)
 
 
-def changed(mission: Mission, values: dict[str, Any]) -> tuple[Craft, dict[str, Law]]:
-    """Return craft and laws with other numbers, which are validated, or with symbols, which nothing validates."""
+def changed(mission: Mission, values: dict[str, Any]) -> tuple[Craft, dict[str, Law], dict[str, Part | None]]:
+    """Return craft, laws and keys of schemes with other numbers, which are validated, or symbols, which are not."""
     of_craft = {_of_craft(key): value for key, value in values.items() if not key.startswith("scheme.")}
     craft = _put(mission.craft, of_craft) if of_craft else mission.craft
-    laws = {}
+    laws, keys = {}, {}
     for each in mission.schemes:
         start = f"scheme.{each.name}."
-        own = {tuple(key.split(".")[3:]): value for key, value in values.items() if key.startswith(start)}
+        told = {
+            tuple(key.removeprefix(start).split(".")): value for key, value in values.items() if key.startswith(start)
+        }
+        own = {path[1:]: value for path, value in told.items() if path[0] == "law"}
         gains = {
             name: _put(getattr(each.law, name), {path[1:]: value for path, value in own.items() if path[0] == name})
             for name in dict.fromkeys(path[0] for path in own)
         }
         laws[each.name] = replace(each.law, **gains) if gains else each.law
-    return craft, laws
+        limits = {(path[0], *(int(part) - 1 for part in path[1:])): told[path] for path in told if path[0] != "law"}
+        keys[each.name] = _put(each.keys, limits) if limits else each.keys
+    return craft, laws, keys
 
 
 def _of_craft(key: str) -> Path:

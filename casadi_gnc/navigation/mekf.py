@@ -46,7 +46,7 @@ from typing import Any
 import casadi as ca
 
 from casadi_gnc.errors import LawError
-from casadi_gnc.mathematics.exact import array
+from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, Sensor, StarTracker, SunSensor
 from casadi_gnc.navigation._navigation import Estimator
@@ -100,15 +100,15 @@ class Mekf(Estimator):
         if late:
             raise LawError(f"{late[0]} is late, which the filter bears of star trackers alone; leave its delay out")
         for name, value in self._noises():
-            if not (value > 0 and math.isfinite(value)):
+            if is_number(value) and not (value > 0 and math.isfinite(value)):
                 raise LawError(f"{name} is {value:g} for the filter, expected more than 0: what it takes for its noise")
 
-    def _noises(self) -> list[tuple[str, float]]:
+    def _noises(self) -> list[tuple[str, Any]]:
         told = [(f"{self.gyro.name}: the angle random walk", self.gyro.angle_random_walk)]
-        told += [(f"{each.name}: a deviation", min(each.deviations)) for each in self.trackers]
+        told += [(f"{each.name}: a deviation", one) for each in self.trackers for one in each.deviations]
         told += [(f"{each.name}: the deviation", each.deviation) for each in (*self.magnetometers, *self.sun_sensors)]
         told += [("attitude_deviation", self.attitude_deviation), ("bias_deviation", self.bias_deviation)]
-        return [*told, ("gate", self.gate), ("patience", float(self.patience))]
+        return [*told, ("gate", self.gate), ("patience", self.patience)]
 
     @property
     def inputs(self) -> Layout:

@@ -149,15 +149,19 @@ def _two(z: Any, y: Any) -> Any:
 
 
 def _turned(offset: Sequence[float], frame: Any) -> Any:
-    return ca.mtimes(quaternions.dcm(ca.DM(list(offset))), frame)
+    return ca.mtimes(quaternions.dcm(array(list(offset))), frame)
 
 
-def _between(axis: Sequence[float]) -> ca.DM:
+def _between(axis: Sequence[Any]) -> Any:
     """Return a rotation, (3, 3), that brings a frame whose z looks somewhere to one whose `axis` does."""
-    x, y, z = (float(value) for value in axis)
-    if z < -1 + 1e-9:
-        return ca.diag(ca.DM([1.0, -1.0, -1.0]))
+    x, y, z = axis
+    known, opposite = is_number(z), ca.diag(ca.DM([1.0, -1.0, -1.0]))
+    if known and z < -1 + 1e-9:
+        return opposite
     # The turn from (0, 0, 1) to the axis in one plane; its inverse is how coordinates change.
-    v = ca.DM([-y, x, 0.0])
-    cross = ca.skew(v)
-    return ca.DM.eye(3) + cross + ca.mtimes(cross, cross) / (1 + z)
+    cross = ca.skew(array([-y, x, 0.0]))
+    square = ca.mtimes(cross, cross)
+    if known:
+        return ca.DM.eye(3) + cross + square / (1 + z)
+    behind = z < -1 + 1e-9
+    return ca.if_else(behind, opposite, ca.DM.eye(3) + cross + square / ca.if_else(behind, 1.0, 1 + z))

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator
 
+from casadi_gnc.mathematics.exact import is_number
 from casadi_gnc.tables.part import Matrix
 
 Rows = list[list[float]]
@@ -51,7 +52,9 @@ def check_inertia(rows: Rows) -> Rows:
 
 
 def check_unit(vector: list[float], prefix: str = "") -> list[float]:
-    """Return a direction as it came; raise `ValueError` if it has not length 1."""
+    """Return a direction as it came; raise `ValueError` if it has not length 1. Symbols may have any."""
+    if not all(map(is_number, vector)):
+        return vector
     length = float(np.linalg.norm(vector))
     if abs(length - 1) > ROTATION_TOLERANCE:
         raise ValueError(f"{prefix}a direction of length {length:.4g}, expected a unit vector")

@@ -55,7 +55,7 @@ def conditions_of(mission: Mission, scheme: str, gains: Gains, *, every: bool = 
     keys = [one.key for one in gains.each]
 
     def checks(values: np.ndarray) -> dict[str, Check]:
-        _, laws = changed(mission, dict(zip(keys, map(float, values), strict=True)))
+        _, laws, _ = changed(mission, dict(zip(keys, map(float, values), strict=True)))
         return {each.name: each for each in laws[scheme].checks()}
 
     first = checks(np.array([one.value for one in gains.each]))

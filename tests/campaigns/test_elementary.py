@@ -3,6 +3,7 @@
 import ctypes
 import math
 
+import casadi as ca
 import mpmath
 import numpy as np
 import pytest
@@ -82,6 +83,15 @@ def test_quantile_is_good_to_the_last_digits(rng):
             assert abs(error) <= 8 * 2.0**-53 * max(abs(found), 1e-3), p
     assert normal.quantile(np.array([0.0, 0.5, 1.0])).tolist() == [-math.inf, 0.0, math.inf]
     assert np.isnan(normal.quantile(np.array([-0.1, 1.1, math.nan]))).all()
+
+
+def test_the_quantile_of_a_symbol_is_that_of_a_number():
+    """Only the logarithm's last digit may differ: by 2^-53 of a number up to 37, which the root halves."""
+    p = ca.SX.sym("p")
+    inside = np.concatenate([np.linspace(1e-3, 1 - 1e-3, 97), 10.0 ** -np.arange(4.0, 290.0, 13.0)])
+    found = np.array(ca.Function("quantile", [p], [normal.quantile_of(p)])(inside.reshape(1, -1))).ravel()
+    assert found == pytest.approx(normal.quantile(inside), rel=4e-15, abs=1e-16)
+    assert normal.quantile_of(0.9) == float(normal.quantile(np.array(0.9)))
 
 
 def test_cumulative_is_good_relative_to_its_tail(rng):

@@ -15,7 +15,16 @@ from casadi_gnc.missions.parameters import vary
 KEYS = {
     "huang2020/detumble": (
         "observer_pinv",
-        ["truth.inertia_factor", "truth.centre_of_mass_error_m", "initial.*", "scheme.observer_pinv.law.rate_gain"],
+        [
+            *(
+                "truth.inertia_factor",
+                "truth.centre_of_mass_error_m",
+                "initial.*",
+                "scheme.observer_pinv.law.rate_gain",
+            ),
+            *("scheme.observer_pinv.torque_limit_N_m", "spacecraft.thrusters.max_force_N"),
+            "spacecraft.rate_limit_rad_per_s",
+        ],
     ),
     "huang2020/slew": ("funnel_robust", ["truth.inertia_factor", "environment.constant_torque_N_m", "initial.mrp"]),
     "huang2019/wheel_faults": (None, ["fault.1.effectiveness", "initial.*", "environment.orbit_rate_rad_per_s"]),
@@ -24,11 +33,16 @@ KEYS = {
     "tao2019/case1": (None, ["spacecraft.mass_kg", "environment.constant.*", "orbit.altitude_m", "initial.mrp"]),
     "satellites/thruster_hold": (
         "robust",
-        ["truth.centre_of_mass_error_m", "slosh.1.frequency_Hz", "initial.rate_deg_per_s"],
+        ["truth.centre_of_mass_error_m", "slosh.1.frequency_Hz", "initial.*", "scheme.robust.effort_limit"],
     ),
     "satellites/earth_pointing": (
         "mrp",
-        ["orbit.altitude_m", "sensor.1.bias_rad_per_s", "initial.euler_321_deg", "wheel.1.max_momentum_N_m_s"],
+        [
+            *("orbit.altitude_m", "initial.*", "wheel.1.max_momentum_N_m_s", "wheel.*.max_torque_N_m"),
+            *("sensor.1.bias_rad_per_s", "sensor.1.angle_random_walk_rad_per_sqrt_s", "sensor.1.range_rad_per_s"),
+            *("sensor.2.dropout", "sensor.2.across_rad", "sensor.2.about_rad", "sensor.2.max_rate_rad_per_s"),
+            *("estimator.attitude_deviation_deg", "estimator.bias_deviation_deg_per_s", "estimator.gate"),
+        ],
     ),
 }
 
@@ -122,16 +136,40 @@ def test_a_key_may_stand_for_several_numbers():
         ("initial.mrp.4", "initial.mrp has no '4'"),
         ("timing.duration_s", "sizes and steps follow from it"),
         ("noise.seed", "noise of its own"),
-        ("spacecraft.thrusters.max_force_N", "the flight software knows"),
-        ("spacecraft.rate_limit_rad_per_s", "before the flight depends on it"),
+        ("spacecraft.thrusters.max_force_N", "set up for one effectiveness and one range; take method pinv"),
         ("spacecraft.thrusters", "no number"),
+        ("scheme.observer_robust.torque_limit", "did you mean torque_limit_N_m"),
+        ("scheme.observer_robust.allocation", "leads nowhere"),
     ],
 )
 def test_a_key_that_cannot_be_a_column_is_told_in_one_sentence(key, told):
     with pytest.raises(FlightError, match=told) as error:
-        vary(casadi_gnc.load("huang2020/detumble"), [key])
+        vary(casadi_gnc.load("huang2020/detumble"), [key], "observer_robust")
     assert key in str(error.value)
     assert len(str(error.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("key", "told"),
+    [
+        ("sensor.2.period_s", "before the flight depends on it"),
+        ("sensor.1.dropout", "where it is not zero the flight has other signals"),
+        ("momentum.null_per_s", "where it is not zero the flight has other signals or steps"),
+        ("momentum.unload_per_s", "coils take momentum away"),
+        ("initial.mrp", "write its nominal value"),
+    ],
+)
+def test_a_satellites_key_that_cannot_be_a_column_is_told_in_one_sentence(key, told):
+    with pytest.raises(FlightError, match=told) as error:
+        vary(casadi_gnc.load("satellites/earth_pointing"), [key], "mrp")
+    assert key in str(error.value)
+    assert len(str(error.value)) < 300
+
+
+def test_a_star_stands_for_the_numbers_that_a_table_gives():
+    one = vary(casadi_gnc.load("satellites/earth_pointing"), ["initial.*"], "mrp")
+    expected = [f"initial.{name}.{i}" for name in ("euler_321_deg", "rate_deg_per_s") for i in (1, 2, 3)]
+    assert sorted(one.parameters.keys) == expected
 
 
 def test_one_number_cannot_follow_two_keys():

@@ -11,6 +11,7 @@ import numpy as np
 
 from casadi_gnc.allocation import AllocationProblem, Direct
 from casadi_gnc.errors import FlightError
+from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.exact import array, is_number, is_zero
 from casadi_gnc.mechanics.satellite_parts import endless
 from casadi_gnc.missions.actuation import Actuation, Actuators
@@ -67,12 +68,21 @@ def _spans(axes: Any) -> bool:
     return len(strength) == 3 and strength[2] > _FLAT * strength[0]
 
 
+def _reaches(axes: Any) -> bool:
+    """Return whether wheels and thrusters reach every direction; raise `FlightError` where that varies."""
+    if axes.shape[1] < 3:
+        return False
+    if not is_number(axes):
+        raise FlightError("whether coils have to help follows from it, so the way torque is shared out does")
+    return _spans(axes)
+
+
 def sharing(craft: SatelliteCraft) -> MomentumSharing | None:
     """Return how torque is shared out where wheels are looked after; None: as the scheme's allocation does."""
     told, wheels = craft.momentum, part_tables.wheels(craft.wheel) if craft.wheel else None
     if is_zero(told.unload_per_s) and is_zero(told.null_per_s):
         return None
-    if wheels is None or not _spans(wheels.axes):
+    if wheels is None or (is_number(wheels.axes) and not _spans(wheels.axes)):
         raise MisfitError("wheels that are looked after have to make torque about every axis by themselves", "momentum")
     rest = told.rest_speeds_rad_per_s or [0.0] * wheels.count
     if len(rest) != wheels.count:
@@ -84,7 +94,7 @@ def sharing(craft: SatelliteCraft) -> MomentumSharing | None:
             raise MisfitError("coils take momentum away; give [[magnetorquer]]", "momentum", "unload_per_s")
         coils = part_tables.directions(craft.magnetorquer, "axis")
         dipoles = array([each.max_dipole_A_m2 for each in craft.magnetorquer])
-        if np.linalg.matrix_rank(np.array(ca.DM(coils)), tol=1e-6) < min(len(craft.magnetorquer), 3):
+        if is_number(coils) and np.linalg.matrix_rank(np.array(coils), tol=1e-6) < min(len(craft.magnetorquer), 3):
             raise MisfitError("the coils' axes lie in one line or plane; turn one", "magnetorquer")
     idle = len(craft.magnetorquer) - coils.shape[1]
     return MomentumSharing(
@@ -110,31 +120,27 @@ def actuation(craft: SatelliteCraft, known: Actuators, told: EffortKeys) -> Actu
         if callable(known.effectiveness):
             message = "the torque of coils follows the field, and robust allocation needs one that stays"
             raise MisfitError(message, "allocation", "method")
-        if not is_number(known.effectiveness):
-            raise FlightError("robust allocation is made for one effectiveness; take method pinv to vary it")
-        effectiveness = np.array(known.effectiveness)
+        effectiveness = np.array(known.fixed)
         problem = AllocationProblem(effectiveness, lower=known.lower, upper=known.upper, **keys.weights())
         return Actuation.of(known, limit, keys.allocator(problem))
     if shared is not None:
         return Actuation.of(replace(known, inverse=shared), limit, Direct())
     by_field = known.effectiveness
-    if isinstance(by_field, TorqueByField) and is_number(by_field.fixed) and not _spans(by_field.fixed):
+    if isinstance(by_field, TorqueByField) and not _reaches(by_field.fixed):
         return Actuation.of(replace(known, inverse=LeastByField(by_field)), limit, Direct())
     return Actuation.of(known, limit, keys.allocator(None))
 
 
-def _most(craft: SatelliteCraft, known: Actuators) -> list[float]:
+def _most(craft: SatelliteCraft, known: Actuators) -> list[Any]:
     """Return the largest torque about each axis, coils in a field of the Earth's strength."""
     fixed: Any = known.effectiveness
     most = [0.0, 0.0, 0.0]
     if isinstance(fixed, TorqueByField):
         strength = _FIELD * sum(each.max_dipole_A_m2 for each in craft.magnetorquer)
         fixed, most = fixed.fixed, [strength] * 3
-    bound = [max(abs(low), abs(high)) for low, high in zip(known.lower, known.upper, strict=True)]
-    if not is_number(fixed):
-        raise FlightError("the largest torques follow from it; give effort_limit in the scheme")
-    made = ca.mtimes(ca.fabs(fixed), ca.DM(bound[: fixed.shape[1]]))
-    return [value + own for value, own in zip(most, ca.DM(made).elements(), strict=True)]
+    bound = bounds.maximum(ca.fabs(array(known.lower)), ca.fabs(array(known.upper)))
+    made = ca.mtimes(ca.fabs(fixed), bound[: fixed.shape[1]])
+    return [value + own for value, own in zip(most, array(made).elements(), strict=True)]
 
 
 def flaws(craft: SatelliteCraft, known: Actuators) -> Iterator[MisfitError]:

@@ -180,7 +180,7 @@ def thrusters(tables: Sequence[ThrusterTable]) -> parts.Thrusters:
         pushes,
         _of(tables, "max_force_N"),
         _of(tables, "rise_time_s"),
-        array([table.specific_impulse_s or 0.0 for table in tables]),
+        array([0.0 if table.specific_impulse_s is None else table.specific_impulse_s for table in tables]),
         tuple(table.pulse is not None for table in tables),
         array([0.0 if table.pulse is None else table.pulse.delay_s for table in tables]),
     )
