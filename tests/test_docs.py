@@ -40,12 +40,15 @@ def test_python_snippets_run(name, block):
     exec(compile(block, name, "exec"), {})
 
 
-def test_the_example_of_an_allocation_file_loads(tmp_path):
+def test_the_examples_of_allocation_files_load(tmp_path):
     text = (ROOT / "docs" / "allocation.md").read_text(encoding="utf-8")
-    (example,) = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "format = 1" in block]
-    path = tmp_path / "wheels.toml"
-    path.write_text(example)
-    assert load_allocation(path).problem.count == 4
+    examples = [block for block in re.findall(r"```toml\n(.*?)```", text, re.DOTALL) if "format = 1" in block]
+    counts = []
+    for number, example in enumerate(examples):
+        path = tmp_path / f"{number}.toml"
+        path.write_text(example)
+        counts.append(load_allocation(path).problem.count)
+    assert counts == [3, 4]
 
 
 def test_links_lead_to_files():

@@ -10,6 +10,7 @@
 
 from casadi_gnc.allocation.allocator import Allocator, solve
 from casadi_gnc.allocation.answer import ACCURACIES, AllocationStatus, Answer, Saturation, best_weights, certify
+from casadi_gnc.allocation.derivatives import Jacobian, jacobian
 from casadi_gnc.allocation.in_flight import (
     Allocate,
     Direct,
@@ -19,6 +20,7 @@ from casadi_gnc.allocation.in_flight import (
     leaves_none_out,
     pseudo_inverse,
 )
+from casadi_gnc.allocation.lexicographic import LeastPropellant, Limit
 from casadi_gnc.allocation.problem import AllocationProblem
 
 __all__ = [
@@ -29,12 +31,16 @@ __all__ = [
     "Allocator",
     "Answer",
     "Direct",
+    "Jacobian",
+    "LeastPropellant",
+    "Limit",
     "OnlineInFlight",
     "PseudoInverse",
     "Saturation",
     "SolverInFlight",
     "best_weights",
     "certify",
+    "jacobian",
     "leaves_none_out",
     "pseudo_inverse",
     "solve",

@@ -29,6 +29,7 @@ class AllocationStatus(Enum):
         "The command's direction cannot be kept: the effort has the least angle to it that the bounds allow."
     )
     DIRECTION_LOST = "Nothing can be made along the command: the forces are those of least error."
+    LIMITS_BROKEN = "No forces inside the bounds keep the linear limits: they are broken as little as can be."
     BAD_COMMAND = "The command or the previous forces are not finite; the previous forces were kept inside the bounds."
 
     @property
@@ -49,6 +50,22 @@ class Saturation(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
+class Level:
+    """Hold what became of the rows of effort of one exact priority.
+
+    Parameters
+    ----------
+    rows : counted from 1.
+    error : sum over its rows of what is missing, under the worst error of the geometry.
+    gap : rigorous bound on the error above the least that the levels before leave.
+    """
+
+    rows: tuple[int, ...]
+    error: float
+    gap: float
+
+
+@dataclass(frozen=True, eq=False)
 class Answer:
     """Hold one allocation.
 
@@ -66,6 +83,7 @@ class Answer:
     claimed : whether the solver itself said it had solved the problem.
     backend : its name.
     seconds, solver_seconds : wall time of the call, and what the solver says it took (NaN: does not say).
+    levels : of exact priorities, the most important first; empty where there are none.
     """
 
     forces: np.ndarray
@@ -81,6 +99,7 @@ class Answer:
     backend: str
     seconds: float = float("nan")
     solver_seconds: float = float("nan")
+    levels: tuple[Level, ...] = ()
 
     @property
     def relative_gap(self) -> float:

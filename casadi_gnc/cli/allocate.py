@@ -69,7 +69,8 @@ def _table(allocator: CaseAllocator, commands: Path, out: Path | None, tally: Ta
         prepare_folder(out.parent)
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(allocating.header(count, rows))
+    linear = allocator.case.least_propellant
+    writer.writerow(allocating.header(count, rows, 0 if linear is None else linear.level_count))
     for answer in allocating.allocate_all(allocator, wanted, tally):
         writer.writerow(allocating.row_of(answer))
     if out is None:

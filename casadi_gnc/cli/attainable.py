@@ -33,6 +33,8 @@ def attainable(
 
     case = load_allocation(problem)
     drawn = None if figures is None else prepare_folder(figures) / f"attainable.{ending.value}"
+    if case.least_propellant is not None and case.least_propellant.has_limits:
+        typer.echo("warning: the sets are those of the bounds alone; [[limit]] tables are not in them", err=True)
     with working("measuring attainable sets"):
         found = analyse(case.physical, case.torque_limit, samples=samples, seed=seed, units=case.units)
     if json:

@@ -210,7 +210,7 @@ def _print(found: Overview) -> None:
     from casadi_gnc.benchmarks.summary import alike
 
     console = Console()
-    console.width = max(console.width, 110)
+    console.width = max(console.width, 128)
     for group, order in found.orders.items():
         table = Table(title=escape(f"{found.results.header['title']}: {group} [us]"))
         table.add_column("", no_wrap=True)

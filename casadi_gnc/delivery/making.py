@@ -72,6 +72,7 @@ def flight_allocator(case: AllocationCase) -> FlightAllocator:
     for given, what in (
         (case.keep_direction, "keep_direction is solved by linear programs"),
         (case.least_force is not None, "least_force_N is solved by a search"),
+        (case.least_propellant is not None, 'objective = "propellant" is solved by linear programs'),
     ):
         if given:
             raise PackageError(f"{case.name}: {what}, which has no bounded time on board; leave the option out")

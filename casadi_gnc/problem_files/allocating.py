@@ -17,7 +17,7 @@ from casadi_gnc.allocation import AllocationStatus, Allocator, Answer
 from casadi_gnc.allocation.allocator import Accuracy
 from casadi_gnc.allocation.direction import along_direction
 from casadi_gnc.allocation.impulse import with_minimum_impulse
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.errors import AllocationError, ProblemError
 from casadi_gnc.mathematics.arrays import real_array
 from casadi_gnc.problem_files.allocation_file import AllocationCase
 from casadi_gnc.system import csv_file
@@ -33,7 +33,14 @@ class CaseAllocator:
     def __init__(self, case: AllocationCase, backend: str, accuracy: Accuracy = "mid") -> None:
         self.case = case
         self._accuracy: Accuracy = accuracy
-        self._allocator = Allocator(case.problem, backend, accuracy=accuracy)
+        self._linear = None if case.least_propellant is None else case.least_propellant.asking(accuracy)
+        if self._linear is not None and backend != "online":
+            raise AllocationError(
+                f'objective = "propellant" is solved by linear programs, and the back end {backend!r} is named; '
+                "leave --backend out"
+            )
+        if self._linear is None:
+            self._allocator = Allocator(case.problem, backend, accuracy=accuracy)
 
     def load_all(self) -> None:
         """Import what is imported when it is first needed, so that no command of a stream waits for it."""
@@ -43,7 +50,9 @@ class CaseAllocator:
         """Return the answer to a command (R,) in its own unit; unallocated effort is in that unit too."""
         case, scaled = self.case, real_array("command", command, ProblemError) * self.case.row_scale
         started = time.perf_counter()
-        if case.least_force is not None:
+        if self._linear is not None:
+            answer = self._linear.solve(scaled)
+        elif case.least_force is not None:
             answer = with_minimum_impulse(
                 case.problem,
                 scaled,
@@ -104,12 +113,13 @@ def parse_line(text: str, rows: int) -> np.ndarray:
     return np.array([csv_file.number(part) for part in parts])
 
 
-def header(count: int, rows: int) -> list[str]:
-    """Return the names of the columns of `row_of`."""
+def header(count: int, rows: int, levels: int = 0) -> list[str]:
+    """Return the names of the columns of `row_of`, where answers have so many exact priorities."""
     forces = [f"F{i}" for i in range(1, count + 1)]
     missing = [f"unallocated{i}" for i in range(1, rows + 1)]
     codes = [f"saturation{i}" for i in range(1, count + 1)]
-    return [*forces, "status", "objective", "duality_gap", "worst_vertex", "iterations", *missing, *codes]
+    exact = [f"level{i}_{what}" for i in range(1, levels + 1) for what in ("error", "gap")]
+    return [*forces, "status", "objective", "duality_gap", "worst_vertex", "iterations", *missing, *codes, *exact]
 
 
 def row_of(answer: Answer) -> list[Any]:
@@ -122,11 +132,15 @@ def row_of(answer: Answer) -> list[Any]:
         answer.worst_vertex,
         answer.iterations,
     ]
-    return [*numbers, answer.status.name, *certificate, *missing, *(int(code) for code in answer.saturation)]
+    levels = [repr(float(value)) for level in answer.levels for value in (level.error, level.gap)]
+    return [*numbers, answer.status.name, *certificate, *missing, *(int(code) for code in answer.saturation), *levels]
 
 
 def as_data(answer: Answer) -> dict[str, Any]:
     """Return an answer as plain data for JSON; numbers that are not finite become null."""
+    levels = [
+        {"rows": list(level.rows), "error": _finite(level.error), "gap": _finite(level.gap)} for level in answer.levels
+    ]
     return {
         "forces": [float(value) for value in answer.forces],
         "status": answer.status.name,
@@ -137,6 +151,7 @@ def as_data(answer: Answer) -> dict[str, Any]:
         "unallocated": [_finite(value) for value in answer.unallocated],
         "saturation": [int(code) for code in answer.saturation],
         "iterations": answer.iterations,
+        **({"levels": levels} if levels else {}),
     }
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from casadi_gnc.allocation import AllocationProblem
 from casadi_gnc.allocation.faults import with_faults
 from casadi_gnc.allocation.impulse import never_fires
+from casadi_gnc.allocation.lexicographic import LeastPropellant, Limit
 from casadi_gnc.allocation.priorities import axis_scale, by_priority
 from casadi_gnc.allocation.wheels import at_speed, combine, wheel_problem
 from casadi_gnc.errors import AllocationError
@@ -40,6 +41,7 @@ class AllocationCase:
     row_scale : (R,), factor to put on a command before it is allocated.
     torque_limit : box that a law may ask for, (R,), or None.
     keep_direction, least_force : see the file's options.
+    least_propellant : the allocator of a file with that objective, else None.
     units : of the rows of effort, "" where a file does not say.
     doubts : sentences on what a file may not mean as it says it.
     """
@@ -55,6 +57,7 @@ class AllocationCase:
     least_force: float | None
     doubts: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    least_propellant: LeastPropellant | None = None
 
     @property
     def warnings(self) -> list[str]:
@@ -124,7 +127,8 @@ def _case(model: AllocationModel, name: str, complaints: Complaints) -> Allocati
     complaints.settle()
     physical, rows = problem, len(problem.effectiveness)
     scale = np.ones(rows)
-    if options.priorities is not None:
+    is_linear = options.objective == "propellant"
+    if options.priorities is not None and not is_linear:
         with complaints.about("options", "priorities"):
             scale = axis_scale(options.priorities, options.priority_ratio)
             problem = by_priority(problem, options.priorities, options.priority_ratio)
@@ -134,6 +138,20 @@ def _case(model: AllocationModel, name: str, complaints: Complaints) -> Allocati
     limit = None if model.torque_limit_N_m is None else np.array(model.torque_limit_N_m)
     if limit is not None and len(limit) != rows:
         complaints.add(("torque_limit_N_m",), f"torque_limit_N_m has {len(limit)} entries, expected {rows}")
+    for place, each in enumerate(model.limit):
+        if len(each.coefficients) != problem.count:
+            told = f"{len(each.coefficients)} coefficients, expected {problem.count}, one an actuator"
+            complaints.add(("limit", place, "coefficients"), told)
+    if is_linear and not np.any(physical.effort_weight):
+        complaints.add(("weights", "effort"), "no force costs propellant: every effort weight is zero; give one more")
+    complaints.settle()
+    least = None
+    if is_linear:
+        limits = [Limit(each.coefficients, each.most) for each in model.limit]
+        with complaints.about("options", "priorities"):
+            least = LeastPropellant(physical, options.priorities, limits)
+        if model.weights.change != 0.0 and "change" in model.weights.model_fields_set:
+            doubts += ("weights.change is not looked at: propellant does not depend on the forces before",)
     complaints.settle()
     return AllocationCase(
         name,
@@ -147,6 +165,7 @@ def _case(model: AllocationModel, name: str, complaints: Complaints) -> Allocati
         options.least_force_N,
         doubts,
         units,
+        least,
     )
 
 

@@ -93,9 +93,20 @@ class Faults(Part):
     degraded: list[Degraded] = []
 
 
+class LinearLimit(Part):
+    """A bound on a weighted sum of the forces: total power, neighbours that must not push together."""
+
+    name: Annotated[str, Field(max_length=40)] = ""
+    coefficients: Column = Field(description="of each actuator, in units of the limit per force")
+    most: float = Field(description="the sum stays at or below this")
+
+
 class Options(Part):
     """How commands that cannot be met as they are, are treated."""
 
+    objective: Literal["quadratic", "propellant"] = Field(
+        default="quadratic", description="propellant: the sum of effort |F - preferred|, by linear programs"
+    )
     keep_direction: bool = Field(default=False, description="scale a command that cannot be met instead of turning it")
     priorities: list[Annotated[int, Field(ge=0)]] | None = Field(default=None, description="one a row, 0 first")
     priority_ratio: Annotated[float, Field(gt=1)] = 100.0
@@ -107,6 +118,12 @@ class Options(Part):
     def _one_treatment(self) -> Options:
         if self.keep_direction and self.least_force_N is not None:
             raise ValueError("keep_direction and least_force_N cannot be combined; leave one out")
+        if self.objective == "propellant":
+            if self.keep_direction or self.least_force_N is not None:
+                given = "keep_direction" if self.keep_direction else "least_force_N"
+                raise ValueError(f'{given} needs objective = "quadratic"; leave one out')
+            if "priority_ratio" in self.model_fields_set:
+                raise ValueError('priorities are exact with objective = "propellant"; leave priority_ratio out')
         return self
 
 
@@ -125,6 +142,13 @@ class AllocationModel(Part):
     weights: Weights = Weights()
     faults: Faults = Faults()
     options: Options = Options()
+    limit: Annotated[list[LinearLimit], Field(max_length=MOST_ACTUATORS)] = []
+
+    @model_validator(mode="after")
+    def _limits_fit(self) -> AllocationModel:
+        if self.limit and self.options.objective != "propellant":
+            raise ValueError('[[limit]] needs objective = "propellant" under [options], whose linear programs keep it')
+        return self
 
     @model_validator(mode="after")
     def _some_actuators(self) -> AllocationModel:

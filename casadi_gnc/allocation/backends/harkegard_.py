@@ -134,8 +134,14 @@ class _LeastSquares(ScaledSolver):
                 np.vstack([effectiveness, self._weighing]), np.concatenate([sample.target, pulled]), box, start
             )
             iterations, ended = found.iterations, found.ended
+        # A sequential answer claims nothing: it minimises something else than the cost.
         self._working = found.working if ended else np.zeros_like(self._working)
-        return Found(found.forces, np.full(len(self.matrices), 1 / len(self.matrices)), iterations, ended)
+        return Found(
+            found.forces,
+            np.full(len(self.matrices), 1 / len(self.matrices)),
+            iterations,
+            ended and not self._sequential,
+        )
 
 
 def _set_up(

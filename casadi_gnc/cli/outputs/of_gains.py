@@ -32,6 +32,15 @@ class Allocation(TypedDict):
 
 
 @_TOLD
+class Level(TypedDict):
+    """What became of the rows of one exact priority; gap null where nothing is proved."""
+
+    rows: list[int]
+    error: float | None
+    gap: float | None
+
+
+@_TOLD
 class Answer(TypedDict, total=False):
     """The answer to one line of a stream: forces with their certificate, or what is wrong with the line."""
 
@@ -51,6 +60,8 @@ class Answer(TypedDict, total=False):
     saturation: list[int]
     """0 inside, 1 at the lower bound, 2 at the upper bound, by actuator."""
     iterations: int
+    levels: list[Level]
+    """Of exact priorities, where the objective is propellant."""
 
 
 @_TOLD
