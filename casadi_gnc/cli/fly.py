@@ -116,9 +116,11 @@ def _keep(
 
         written += plot_flights(mission, flights, prepare_folder(figures), ending.value)
     if report is not None:
-        from casadi_gnc.reports import flight_page
+        from casadi_gnc.reports import flight_page, loops
 
-        flight_page.of_mission(mission, flights, report)
+        known = loops.loops_of(mission, [one.scheme for one in flights])
+        written.append(loops.save(folder, known))
+        flight_page.of_mission(mission, flights, report, known)
     return written
 
 

@@ -8,13 +8,14 @@ from typing import Any
 
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.reports import page, records
+from casadi_gnc.reports import loop_charts, page, records
 from casadi_gnc.reports.describing import described
 from casadi_gnc.reports.flight_data import data_of
+from casadi_gnc.reports.loops import loops_of
 from casadi_gnc.reports.packed import Packed
 from casadi_gnc.reports.records import Flown, Record
 from casadi_gnc.reports.still import still
-from casadi_gnc.reports.told import Measured
+from casadi_gnc.reports.told import Measured, ShownLoops
 from casadi_gnc.reports.verdicts import judged
 
 _SCRIPTS = (
@@ -38,9 +39,11 @@ _PROVENANCE = {
 }
 
 
-def of_mission(mission: Mission, flights: Sequence[Flight], target: Path) -> Path:
-    """Write the page of flights of a mission; return its path."""
-    return page.write(target, page_of(records.of_flights(flights, described(mission, [one.scheme for one in flights]))))
+def of_mission(mission: Mission, flights: Sequence[Flight], target: Path, loops: ShownLoops | None = None) -> Path:
+    """Write the page of flights of a mission; return its path. Give `loops` where they are known."""
+    names = [one.scheme for one in flights]
+    known = loops_of(mission, names) if loops is None else loops
+    return page.write(target, page_of(records.of_flights(flights, described(mission, names), known)))
 
 
 def of_folder(folder: Path, target: Path) -> Path:
@@ -60,6 +63,9 @@ def page_of(flown: Flown) -> str:
     parts += [("requirements", "Requirements")] if requirements else []
     parts += [("metrics", "Metrics")]
     parts += [("space", "In space"), ("time", "Over time")] if drawn else []
+    loops, slices = loop_charts.shown(flown.loops), loop_charts.slices(flown.loops.slices)
+    parts += [("loops", "Loops")] if loops else []
+    parts += [("attainable", "Attainable")] if slices else []
     context = {
         "title": (mission.title or mission.mission) if mission else "Flights",
         "subtitle": mission.source if mission else "",
@@ -73,7 +79,8 @@ def page_of(flown: Flown) -> str:
         "drawn": [one.title for one in drawn],
         "still": still(drawn[0], flown.scheme(drawn[0].scheme)) if drawn else "",
         "space_told": _space_told(flown, drawn),
-        "more": [],
+        "loops": loops,
+        "slices": slices,
         "provenance": _provenance(flown),
     }
     return page.render("flight.html.j2", context, data, packed, _SCRIPTS if drawn else ())

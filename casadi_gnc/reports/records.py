@@ -16,7 +16,8 @@ from pydantic import BaseModel, ValidationError
 from casadi_gnc.errors import ReportError
 from casadi_gnc.missions.flight import Flight
 from casadi_gnc.reports.describing import FILE
-from casadi_gnc.reports.told import ShownMission, ShownScheme, Summary
+from casadi_gnc.reports.loops import FILE as LOOPS
+from casadi_gnc.reports.told import ShownLoops, ShownMission, ShownScheme, Summary
 from casadi_gnc.tables.wording import cut
 
 T = TypeVar("T", bound=BaseModel)
@@ -60,18 +61,20 @@ class Flown:
     records : at least one.
     mission : what they flew; None where it is lost.
     lacking : what the reader must know to be missing, a sentence each.
+    loops : what was kept of its loops and of what its actuators can make; empty where nothing was.
     """
 
     records: Sequence[Record]
     mission: ShownMission | None
     lacking: list[str] = field(default_factory=list)
+    loops: ShownLoops = field(default_factory=ShownLoops)
 
     def scheme(self, name: str) -> ShownScheme | None:
         """Return what is known of a scheme beside its record."""
         return None if self.mission is None else self.mission.schemes.get(name)
 
 
-def of_flights(flights: Sequence[Flight], mission: ShownMission) -> Flown:
+def of_flights(flights: Sequence[Flight], mission: ShownMission, loops: ShownLoops) -> Flown:
     """Return flights as a page takes them."""
     records = [
         Record(
@@ -82,7 +85,7 @@ def of_flights(flights: Sequence[Flight], mission: ShownMission) -> Flown:
         )
         for one in flights
     ]
-    return Flown(records, mission)
+    return Flown(records, mission, loops=loops)
 
 
 def is_flight_folder(folder: Path) -> bool:
@@ -118,7 +121,16 @@ def of_folder(folder: Path) -> Flown:
             f"{str(folder)!r} holds no flight that can be read: {'; '.join(lacking) or 'it is empty'}. Fly into it "
             "first: casadi-gnc fly PROBLEM --out FOLDER"
         )
-    return Flown(records, mission, lacking)
+    return Flown(records, mission, lacking, _loops(folder, lacking))
+
+
+def _loops(folder: Path, lacking: list[str]) -> ShownLoops:
+    """Return the loops that a folder keeps; a flight without a page keeps none."""
+    if not (folder / LOOPS).exists():
+        return ShownLoops()
+    content = _json(folder / LOOPS, lacking, "poles, margins and attainable sets are not drawn")
+    found = None if content is None else _checked(ShownLoops, content, LOOPS, lacking)
+    return ShownLoops() if found is None else found
 
 
 def _checked(kind: type[T], content: Any, name: str, lacking: list[str]) -> T | None:

@@ -124,6 +124,44 @@ class ShownMetric(Told):
     unit: str
 
 
+class ShownCurve(Told):
+    """The loop cut at one effort: frequency [rad/s], gain [dB], phase [deg]."""
+
+    name: str
+    frequency: list[FiniteFloat]
+    gain: list[FiniteFloat]
+    phase: list[FiniteFloat]
+
+
+class ShownLoop(Told):
+    """A scheme's loop in words, its poles, curves and rows of margins; poles are None where it has no slope."""
+
+    scheme: str
+    told: str
+    sampled: bool = False
+    poles: list[tuple[FiniteFloat, FiniteFloat]] | None = None
+    curves: list[ShownCurve] = []
+    margins: list[list[str]] = []
+
+
+class ShownSlice(Told):
+    """Outlines of the attainable sets in a plane through zero, by name, and the limit of the effort there."""
+
+    schemes: list[str]
+    across: str
+    up: str
+    outlines: dict[str, list[tuple[FiniteFloat, FiniteFloat]]]
+    limit: tuple[FiniteFloat, FiniteFloat] | None = None
+
+
+class ShownLoops(Told):
+    """What `loops.json` holds."""
+
+    format: Literal[1] = 1
+    loops: list[ShownLoop] = []
+    slices: list[ShownSlice] = []
+
+
 class ShownMission(Told):
     """What a reader of a flight must know of its mission beside the record."""
 

@@ -28,12 +28,14 @@ def flown(tmp_path_factory, detumble):
     """A folder with the three flights of the de-tumble, as `casadi-gnc fly` writes it; and the mission."""
     import casadi_gnc
     from casadi_gnc.missions.flight import save_summary
-    from casadi_gnc.reports import describing
+    from casadi_gnc.reports import describing, loops
 
     folder = tmp_path_factory.mktemp("flown")
     flights = casadi_gnc.fly_all(detumble)
     for flight in flights:
         flight.save(folder)
     save_summary(folder, flights)
-    describing.save(folder, detumble, [one.scheme for one in flights])
+    names = [one.scheme for one in flights]
+    describing.save(folder, detumble, names)
+    loops.save(folder, loops.loops_of(detumble, names))
     return folder

@@ -71,8 +71,9 @@ def test_hostile_titles(detumble, tmp_path):
 @pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (400, "dark")])
 def test_quiet_and_legible(browser, page, width, scheme):
     with opened(browser, page, width=width, scheme=scheme) as sheet:
-        # Of one loop with margins poles, Nichols and Bode; of two that are unstable the poles.
-        assert sheet.locator("figure.chart").count() == 6
+        # Of one loop with margins poles, Nichols and Bode; of two that are unstable the poles; of both kinds of
+        # allocation three slices.
+        assert sheet.locator("figure.chart").count() == 12
         legible(sheet, width)
         keep(sheet, f"check-{width}-{scheme}")
 

@@ -12,10 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import casadi_gnc
 from casadi_gnc.errors import ReportError
 from casadi_gnc.reports import flight_page, records
+from casadi_gnc.reports.loops import loops_of
+from casadi_gnc.reports.told import ShownLoops
 from casadi_gnc.reports.writing import write_report
 from casadi_gnc.system.text import visible
 
@@ -93,7 +96,7 @@ def test_hostile_texts_are_texts(detumble, tmp_path):
     mission = replace(detumble, title=HOSTILE, source=10_000 * "long ").with_timing(duration=20.0)
     scheme = mission.with_scheme("damping_pinv", title=HOSTILE)
     flight = replace(casadi_gnc.fly(scheme), notes=(HOSTILE,))
-    told = flight_page.of_mission(scheme, [flight], tmp_path / "a.html").read_text(encoding="utf-8")
+    told = flight_page.of_mission(scheme, [flight], tmp_path / "a.html", ShownLoops()).read_text(encoding="utf-8")
     assert chr(0x202E) not in told
     shell = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", told, flags=re.DOTALL)
     assert "<img" not in shell
@@ -140,6 +143,8 @@ def test_half_a_folder_is_shown_as_far_as_it_goes(flown, tmp_path):
         ("mission.json", None, "mission.json is not there: limits, funnels and the view in space are not drawn"),
         ("mission.json", '{"format": 2}', "mission.json: format:"),
         ("mission.json", "nonsense", "mission.json cannot be read"),
+        ("loops.json", '{"format": 2}', "loops.json: format:"),
+        ("loops.json", "[", "loops.json cannot be read"),
     ],
 )
 def test_what_another_version_wrote_is_said_and_the_rest_shown(flown, tmp_path, name, content, sentence):
@@ -151,6 +156,39 @@ def test_what_another_version_wrote_is_said_and_the_rest_shown(flown, tmp_path, 
     page, told = lacking(folder, tmp_path)
     assert sentence in told
     assert page.count('name="scheme"') == 3
+
+
+def test_margins_poles_and_attainable_sets_are_there(page, flown, detumble):
+    """Of every scheme, as `margins` tells them; sets of two kinds of allocation, the corners by a linear program."""
+    told = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+    part = told[told.index('id="loops"') : told.index('id="attainable"')]
+    for scheme in detumble.schemes:
+        own = part.split(f"<h3>{scheme.title}</h3>")[1].split("<h3>")[0]
+        found = casadi_gnc.margins(detumble, scheme.name)[0]
+        for name, one in found.channels.items():
+            assert f'<td class="name">{name}</td>' in own
+            assert f"{one.delay:.4g} s" in own
+        assert own.count('<figure class="chart">') == 4
+    part = told[told.index('id="attainable"') : told.index('id="provenance"')]
+    assert part.count("<h3>") == 2  # schemes of the pseudo-inverse together
+    assert part.count('<figure class="chart">') == 6
+    # What is farthest along x in the slice of x and y: a linear program with the other two axes.
+    kept = json.loads((flown / "loops.json").read_text())["slices"][0]
+    assert (kept["across"], kept["up"]) == ("torque x [N m]", "torque y [N m]")
+    actuation = detumble.scheme("damping_pinv").actuation
+    matrix = np.array(actuation.effectiveness)
+    best = linprog(
+        -matrix[0], A_eq=matrix[2:], b_eq=[0.0], bounds=list(zip(actuation.lower, actuation.upper, strict=True))
+    )
+    assert max(x for x, _ in kept["outlines"]["nominal geometry"]) == pytest.approx(-best.fun, rel=1e-4)
+
+
+def test_a_folder_without_loops_has_none(flown, tmp_path):
+    folder = copy(flown, tmp_path)
+    (folder / "loops.json").unlink()
+    page, told = lacking(folder, tmp_path)
+    assert told == ""
+    assert 'id="loops"' not in page
 
 
 def test_signals_that_pictures_want_and_records_lack(flown, tmp_path):
@@ -201,15 +239,26 @@ def test_what_is_no_flight_is_told(tmp_path):
     assert not (tmp_path / "a.html").exists()
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["huang2019/nominal", "sun2018/circular_orbit", "shi2020/docking", "tao2019/case1", "satellites/thruster_hold"],
-)
+CRAFT = ["huang2019/nominal", "sun2018/circular_orbit", "shi2020/docking", "tao2019/case1", "satellites/thruster_hold"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CRAFT)
+def test_loops_of_every_craft(name):
+    """A curve of each row of effort; three planes, where the effectiveness stays."""
+    mission = casadi_gnc.load(name)
+    actuation = mission.schemes[0].actuation
+    found = loops_of(mission, [mission.schemes[0].name])
+    assert len(found.loops[0].curves) == actuation.effort.size
+    assert len(found.slices) == (0 if callable(actuation.effectiveness) else 3)
+
+
+@pytest.mark.parametrize("name", CRAFT)
 def test_every_craft_is_drawn_whole(name, tmp_path):
     """All that its pictures and its scene name is recorded."""
     mission = casadi_gnc.load(name).with_timing(duration=10.0)
     flights = [casadi_gnc.fly(mission)]
-    page = flight_page.of_mission(mission, flights, tmp_path / "a.html").read_text(encoding="utf-8")
+    page = flight_page.of_mission(mission, flights, tmp_path / "a.html", ShownLoops()).read_text(encoding="utf-8")
     assert 'id="lacking"' not in page
     data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
     assert data["schemes"][0]["scene"] is not None
