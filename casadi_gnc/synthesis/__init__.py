@@ -26,6 +26,7 @@ from casadi_gnc.synthesis.recipes.intermediate_observer import intermediate_obse
 from casadi_gnc.synthesis.recipes.mixed_state_feedback import mixed_state_feedback
 from casadi_gnc.synthesis.recipes.observer import observer
 from casadi_gnc.synthesis.recipes.state_feedback import state_feedback
+from casadi_gnc.synthesis.structured import MuBounds, Uncertainty, mu_bounds, mu_of_loop
 from casadi_gnc.synthesis.unknowns import block_matrix
 
 __all__ = [
@@ -36,10 +37,12 @@ __all__ = [
     "LmiAnswer",
     "LmiStatus",
     "Lmis",
+    "MuBounds",
     "Norm",
     "Peak",
     "Ray",
     "Synthesis",
+    "Uncertainty",
     "block_matrix",
     "box_vertices",
     "h_infinity_norm",
@@ -47,6 +50,8 @@ __all__ = [
     "input_ellipsoid",
     "intermediate_observer",
     "mixed_state_feedback",
+    "mu_bounds",
+    "mu_of_loop",
     "observer",
     "peak_command",
     "poles",

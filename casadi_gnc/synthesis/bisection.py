@@ -32,7 +32,13 @@ class Least:
 
 
 def least(
-    attempt: Callable[[float, bool], LmiAnswer], start: float, relative: float, largest: float, *, prove: bool = False
+    attempt: Callable[[float, bool], LmiAnswer],
+    start: float,
+    relative: float,
+    largest: float,
+    *,
+    floor: float = 0.0,
+    prove: bool = False,
 ) -> Least:
     """Return the least positive number for which an attempt holds.
 
@@ -42,6 +48,7 @@ def least(
     start : tried first, and doubled until there is a point.
     relative : to which the number is sought.
     largest : from which on there is no more doubling.
+    floor : to which the number is sought where it tends to zero.
     prove : whether every step is to have its proof.
     """
     high, low = start, 0.0
@@ -55,7 +62,7 @@ def least(
             break
         low, high = high, 2 * high
         best = attempt(high, prove)
-    while high - low > relative * high:
+    while high - low > max(relative * high, floor):
         middle = float(np.sqrt(low * high)) if low > 0.1 * high else (low + high) / 2
         trial = attempt(middle, prove)
         if trial.status.holds:
@@ -63,5 +70,5 @@ def least(
         else:
             low = middle
     if not prove and low > 0 and attempt(low, True).status.holds:
-        return least(attempt, start, relative, largest, prove=True)
+        return least(attempt, start, relative, largest, floor=floor, prove=True)
     return Least(high, best, low)

@@ -104,6 +104,14 @@ class ConicData:
         """Return the name of the unknown that each scalar unknown belongs to, (N,)."""
         return [label.split("[")[0] for label in self.labels]
 
+    def towards(self, other: ConicData, share: float) -> ConicData:
+        """Return these data plus a share of the way to others of the same constraints: what is affine in a number."""
+        return replace(
+            self,
+            matrix=(self.matrix + share * (other.matrix - self.matrix)).tocsr(),
+            offset=self.offset + share * (other.offset - self.offset),
+        )
+
     def without(self, names: set[str]) -> ConicData:
         """Return the data without some constraints."""
         kept = [block for block in self.blocks if block.name not in names]

@@ -17,7 +17,7 @@ import warnings
 import numpy as np
 
 from casadi_gnc.problem_files.synthesis_file import load_synthesis
-from casadi_gnc.synthesis.recipes.intermediate_observer import _between, _pose, uncoupled
+from casadi_gnc.synthesis.recipes.intermediate_observer import _pose, uncoupled
 
 A, B, VARPI, S, MARGIN = np.array([[0, 1.0], [0, 0]]), np.array([[0], [0.05]]), 200.0, 0.3, 1e-6
 ONE_AXIS = (A, B)
@@ -40,9 +40,9 @@ def pose_ours(square, plant):
 
 def ours(plant):
     lmis, one = (pose_ours(square, plant) for square in (0.0, 1.0))
-    ends = lmis.data(), one.data()
-    low, high = bisect(lambda square: lmis.attempt(_between(*ends, square), prove=False).status.holds)
-    assert not lmis.attempt(_between(*ends, low**2)).status.holds  # with its proof
+    zero, ends = lmis.data(), one.data()
+    low, high = bisect(lambda square: lmis.attempt(zero.towards(ends, square), prove=False).status.holds)
+    assert not lmis.attempt(zero.towards(ends, low**2)).status.holds  # with its proof
     return high
 
 

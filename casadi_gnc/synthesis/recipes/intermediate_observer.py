@@ -21,7 +21,6 @@ determined; the gains returned are those at the analytic centre, which no solver
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -31,7 +30,6 @@ from casadi_gnc.errors import SynthesisError
 from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
 from casadi_gnc.synthesis.answer import LmiAnswer
 from casadi_gnc.synthesis.bisection import least
-from casadi_gnc.synthesis.conic import ConicData
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
 from casadi_gnc.synthesis.unknowns import block_matrix
@@ -128,12 +126,12 @@ def intermediate_observer(
     lmis, zero, one = poses[0], poses[0].data(), poses[1].data()
 
     def attempt(gamma: float, prove: bool) -> LmiAnswer:
-        return lmis.attempt(_between(zero, one, gamma**2), backend, prove=prove, **options)
+        return lmis.attempt(zero.towards(one, gamma**2), backend, prove=prove, **options)
 
     found = least(attempt, 1.0, relative, largest_gamma)
     if not found.answer.status.holds:
         return failed(found.answer)
-    centre = lmis.attempt(_between(zero, one, found.value**2), "barrier", centre=True)
+    centre = lmis.attempt(zero.towards(one, found.value**2), "barrier", centre=True)
     best = centre if centre.status.holds else found.answer
     K, L = np.zeros((m, n)), np.zeros((n, n))
     for part, (states, inputs) in enumerate(parts):
@@ -179,15 +177,6 @@ def certify_pair(
 def sample_s(A: Any, B: Any, varpi: float, values: Sequence[float], **options: Any) -> dict[float, Synthesis]:
     """Return the synthesis for each s, to choose between gamma and gains; see `intermediate_observer`."""
     return {s: intermediate_observer(A, B, varpi, s=s, **options) for s in values}
-
-
-def _between(zero: ConicData, one: ConicData, square: float) -> ConicData:
-    """Return data that are affine in gamma^2 from those at 0 and at 1: nothing is differentiated again."""
-    return replace(
-        zero,
-        matrix=(zero.matrix + square * (one.matrix - zero.matrix)).tocsr(),
-        offset=zero.offset + square * (one.offset - zero.offset),
-    )
 
 
 def loop_rows(A: Any, B: Any, varpi: float, X1: Any, X3: Any, W: Any, H: Any) -> list[list[Any]]:
