@@ -35,14 +35,14 @@ def perturbation_of(M: np.ndarray, structure: Sequence[Any], starts: int) -> tup
     best, found = 0.0, None
     begun = []
     for seed in range(starts):
-        own: tuple[float, np.ndarray | None] = (0.0, None)
+        own, here = -1.0, np.zeros_like(M)
         for Q in _passed(M, places, seed):
             value, phase = _singular(M @ Q, is_real)
-            own = max(own, (value, phase * Q), key=lambda pair: pair[0])
-            last = Q
-        begun.append(last if own[1] is None else own[1])
-        if own[0] > best:
-            best, found = own
+            if value >= own:  # zero too: where none is singular, the last
+                own, here = value, phase * Q
+        begun.append(here)
+        if own > best:
+            best, found = own, here
     for Q in ([] if found is None else [found]) + begun[:_CLIMBS]:
         Q = _climbed(M, places, Q)
         value, phase = _singular(M @ Q, is_real)
@@ -82,7 +82,7 @@ def _climbed(M: np.ndarray, places: Sequence[Any], Q: np.ndarray) -> np.ndarray:
             part = np.array([np.angle(block[0, 0])])
         else:
             left, _, right = np.linalg.svd(block)
-            part = np.concatenate([left[:, 0].real, left[:, 0].imag, right[0].real, right[0].imag])
+            part = np.concatenate([np.real(left[:, 0]), np.imag(left[:, 0]), np.real(right[0]), np.imag(right[0])])
         parts.append(part)
         widths.append(len(part))
     splits = np.cumsum(widths)[:-1]
@@ -123,8 +123,8 @@ def _unit(vector: np.ndarray) -> np.ndarray:
     return vector / length if length > 0 else vector
 
 
-def _phase(number: complex) -> complex:
-    return number / abs(number) if abs(number) > 0 else 1.0 + 0j
+def _phase(number: Any) -> complex:
+    return complex(number / abs(number)) if abs(number) > 0 else 1.0 + 0j
 
 
 def _share(q: float, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> float:

@@ -164,9 +164,9 @@ def mu_of_loop(
 def _complex(M: Any) -> np.ndarray:
     from casadi_gnc.synthesis.analysis import matrices
 
-    array = np.asarray(M)
+    array: Any = np.asarray(M)
     if np.iscomplexobj(array):
-        real, imaginary = matrices(M=array.real, **{"the imaginary part of M": array.imag})
+        real, imaginary = matrices(**{"M": array.real, "the imaginary part of M": array.imag})
         return real + 1j * imaginary
     return matrices(M=M)[0].astype(complex)
 
@@ -224,7 +224,7 @@ def _hermitian(lmis: Lmis, name: str, size: int) -> Pair:
 
 
 def _embedded(pair: Pair) -> ca.SX:
-    return ca.blockcat([[pair[0], -pair[1]], [pair[1], pair[0]]])
+    return ca.vertcat(ca.horzcat(pair[0], -pair[1]), ca.horzcat(pair[1], pair[0]))
 
 
 def _scalings(answer: LmiAnswer, structure: Sequence[Uncertainty]) -> tuple[np.ndarray, np.ndarray]:
@@ -243,4 +243,5 @@ def _scalings(answer: LmiAnswer, structure: Sequence[Uncertainty]) -> tuple[np.n
                 part[rows[1], rows[0]] -= 1j * answer.unknowns[f"{letter}{i}i"].ravel()
             parts.append(part)
         found.append(parts)
-    return block_diag(*found[0]), block_diag(*found[1])
+    D, G = (np.asarray(block_diag(*parts)) for parts in found)
+    return D, G
