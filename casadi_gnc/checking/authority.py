@@ -18,19 +18,28 @@ from casadi_gnc.missions.scheme import Scheme
 _BORNE = 1e-6
 #: Share below which an effort counts as not made: what is left is the linear program's rounding.
 _SPANNED = 1e-9
+#: What is said where the effectiveness follows the measurement: it is another a moment later, so what one moment lacks
+#: is no fault of the craft.
+AT_FIRST = ", at the first measurement"
+FOLLOWS = (
+    "That changes with the measurement, as what coils make changes with the field; it calls for no actuator by itself. "
+    "Let a flight show whether every effort is made in time."
+)
 
 
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the share of the virtual-control box that is made, and what standing still at the target takes."""
-    span = spanned(mission, scheme)
+    span, follows = spanned(mission, scheme), callable(scheme.actuation.effectiveness)
     yield Check(
         "authority.span",
         span,
         0.0,
         "-",
-        "note" if np.isnan(span) or callable(scheme.actuation.effectiveness) else "fail",
-        "The actuators cannot make some effort at all, however little of it: the craft drifts off that way.",
-        "Add or turn an actuator so that every direction of effort can be made.",
+        "note" if np.isnan(span) or follows else "fail",
+        f"The actuators cannot make some effort at all, however little of it{AT_FIRST}."
+        if follows
+        else "The actuators cannot make some effort at all, however little of it: the craft drifts off that way.",
+        FOLLOWS if follows else "Add or turn an actuator so that every direction of effort can be made.",
         "least share of what all actuators make of a row of effort at most, with the other rows at zero",
         at_least=True,
         strict=True,
@@ -43,7 +52,9 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "-",
         "note",
         "The law may ask for efforts that the actuators cannot make; what is missing is then up to the allocation.",
-        "Shrink the limits of the effort to that share, or feed back the achieved effort.",
+        "Feed back the achieved effort: the share is that of the first measurement."
+        if follows
+        else "Shrink the limits of the effort to that share, or feed back the achieved effort.",
         "largest multiple of the box of limits, every corner of which the actuators can make",
         at_least=True,
     )

@@ -154,28 +154,30 @@ def _needed_share(
     walls = [np.array([np.array(ca.DM(wall)).ravel() for wall in bounds.walls(t)]) for t in times]
     axes, count, steps = gain.shape[0], gain.shape[1], len(times) - 1
     h = times[1] - times[0]
-    # s at grid point k is place + t speed + sum over held intervals j < k of weight[k, j] s''_j.
-    k, j = np.meshgrid(np.arange(1, steps + 1), np.arange(steps), indexing="ij")
-    weight = np.where(j < k, h**2 * (k - j - 0.5), 0.0)
-    reach = sparse.kron(weight, gain, format="csr")
-    free = (place + times[1:, None] * speed + (weight @ drift)).ravel()
-    lower, upper = np.array([w[0] for w in walls[1:]]).ravel(), np.array([w[1] for w in walls[1:]]).ravel()
-    eye = sparse.identity(steps, format="csr")
-    ones = np.ones((steps, 1))
-    blocks = [
-        sparse.hstack([reach, np.zeros((steps * axes, 1))]),
-        sparse.hstack([-reach, np.zeros((steps * axes, 1))]),
-        sparse.hstack([sparse.identity(steps * count), -np.kron(ones, np.c_[most_above])]),
-        sparse.hstack([-sparse.identity(steps * count), np.kron(ones, np.c_[most_below])]),
-        sparse.hstack([sparse.kron(eye, matrix), -np.kron(ones, np.c_[limit_above])]),
-        sparse.hstack([-sparse.kron(eye, matrix), np.kron(ones, np.c_[limit_below])]),
+    # With s'' held between grid points, s_(k+1) - 2 s_k + s_(k-1) = h^2 (s''_k + s''_(k-1)) / 2, and the first step has
+    # s_1 = place + h speed + h^2 s''_0 / 2. Signals inside their walls are bounds, and few numbers stand in a row.
+    now, before = np.eye(steps), np.eye(steps, k=-1)
+    second, mean = now - 2 * before + np.eye(steps, k=-2), (now + before) / 2
+    known = h**2 * (mean @ drift)
+    known[0] += place + h * speed
+    known[1:2] -= place
+    lower, upper = (np.array([wall[side] for wall in walls[1:]]).ravel() for side in (0, 1))
+    eye, each = sparse.identity(steps), np.ones((steps, 1))
+    inside = [
+        sparse.hstack([sparse.identity(steps * count), -np.kron(each, np.c_[most_above])]),
+        sparse.hstack([-sparse.identity(steps * count), np.kron(each, np.c_[most_below])]),
+        sparse.hstack([sparse.kron(eye, matrix), -np.kron(each, np.c_[limit_above])]),
+        sparse.hstack([-sparse.kron(eye, matrix), np.kron(each, np.c_[limit_below])]),
     ]
-    rest = np.zeros(steps * (2 * count + 2 * len(matrix)))
+    bounded = sparse.vstack(inside)
+    moving = [sparse.kron(second, sparse.identity(axes)), -(h**2) * sparse.kron(mean, gain)]
     found = linprog(
-        np.r_[np.zeros(steps * count), 1.0],
-        A_ub=sparse.vstack(blocks, format="csr"),
-        b_ub=np.r_[upper - free, free - lower, rest],
-        bounds=[(None, None)] * (steps * count) + [(0, None)],
+        np.r_[np.zeros(steps * (axes + count)), 1.0],
+        A_ub=sparse.hstack([sparse.csr_array((bounded.shape[0], steps * axes)), bounded], format="csr"),
+        b_ub=np.zeros(bounded.shape[0]),
+        A_eq=sparse.hstack([*moving, sparse.csr_array((steps * axes, 1))], format="csr"),
+        b_eq=known.ravel(),
+        bounds=[*zip(lower, upper, strict=True), *[(None, None)] * (steps * count), (0, None)],
         method="highs",
         options={"time_limit": programs.PATIENCE},
     )

@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.checking import authority
 from casadi_gnc.checking.authority import believed
 from casadi_gnc.checks import Check
 from casadi_gnc.mathematics import exact
@@ -30,7 +31,6 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     matrix = scale(scheme) @ believed(mission, scheme)
     strength = np.linalg.svd(matrix, compute_uv=False)
     rank_gap = float(strength[-1] / strength[0]) if strength[0] > 0 else 0.0
-    # Where it follows the measurement, it is another a moment later: what one moment lacks is no failure of the craft.
     follows = callable(scheme.actuation.effectiveness)
     yield Check(
         "geometry.effectiveness",
@@ -38,8 +38,8 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         1e-6,
         "-",
         "note" if follows else "fail",
-        "Some effort cannot be made by any combination of the actuators.",
-        "Add or turn an actuator.",
+        f"Some effort cannot be made by any combination of the actuators{authority.AT_FIRST if follows else ''}.",
+        authority.FOLLOWS if follows else "Add or turn an actuator.",
         "smallest over largest singular value of the effectiveness, rows scaled by their limits",
         at_least=True,
     )
@@ -50,8 +50,8 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         _WELL_CONDITIONED,
         "-",
         "note" if follows else "warn",
-        "Some effort costs the actuators very much more than another.",
-        "Turn the actuators, or fit the limits of the effort to what the actuators make.",
+        f"Some effort costs the actuators very much more than another{authority.AT_FIRST if follows else ''}.",
+        authority.FOLLOWS if follows else "Turn the actuators, or fit the limits of the effort to what they make.",
         "condition number of the effectiveness, rows scaled by their limits",
     )
     told = {"believed": scheme.law.believed_inertia(), **mission.truth.inertias()}

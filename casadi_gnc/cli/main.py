@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import os
 import sys
@@ -13,6 +14,10 @@ from casadi_gnc.errors import GncError
 # machine that has other work, and add in another order with their number. Read when NumPy is first imported.
 for _variable in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_variable, "1")
+
+# Modules and expressions are built by the ten thousand and stay: looking through them for garbage every 700 objects, as
+# Python does, is a twentieth of a short command.
+gc.set_threshold(50_000, 20, 50)
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from casadi_gnc.checking import authority, geometry
 from casadi_gnc.errors import GncError
 from casadi_gnc.problem_files.loading import load
 from casadi_gnc.vehicles.satellite.on_board import LeastByField, TorqueByField
@@ -59,3 +60,16 @@ def test_coils_along_one_axis_alone_are_refused(tmp_path):
     )
     with pytest.raises(GncError, match="coils along one axis make torque about one direction alone; turn one"):
         load(str(path))
+
+
+def test_checks_of_coils_alone_ask_for_no_further_actuator():
+    # Each field leaves its own direction out, and any two together leave none: what is missing is made a moment later.
+    made = [np.cross(np.eye(3), field).T for field in FIELDS[:2]]
+    assert [np.linalg.matrix_rank(one) for one in (*made, np.hstack(made))] == [2, 2, 3]
+    mission = load("satellites/detumble_bdot", strict=False)
+    found = [each for checks in (geometry.checks, authority.checks) for each in checks(mission, mission.schemes[0])]
+    told = {each.name: f"{each.consequence} {each.remedy}" for each in found if each.verdict == "note"}
+    assert {"geometry.effectiveness", "geometry.conditioning", "authority.span"} <= set(told)
+    for sentence in told.values():
+        assert "first measurement" in sentence
+        assert not any(advice in sentence for advice in ("Add ", "Turn ", "Shrink", "drifts off"))
