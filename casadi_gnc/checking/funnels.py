@@ -169,7 +169,7 @@ def _needed_share(
         sparse.hstack([sparse.kron(eye, matrix), -np.kron(each, np.c_[limit_above])]),
         sparse.hstack([-sparse.kron(eye, matrix), np.kron(each, np.c_[limit_below])]),
     ]
-    bounded = sparse.vstack(inside)
+    bounded: Any = sparse.vstack(inside)
     moving = [sparse.kron(second, sparse.identity(axes)), -(h**2) * sparse.kron(mean, gain)]
     found = linprog(
         np.r_[np.zeros(steps * (axes + count)), 1.0],
