@@ -73,6 +73,22 @@ class Direction:
 
 
 @dataclass(frozen=True)
+class Track:
+    """Draw a direction that moves during a flight and is not recorded, such as that of the magnetic field.
+
+    Parameters
+    ----------
+    label : what the reader is told.
+    times : (K,), increasing, [s]; between two of them the direction goes straight on, outside it stays.
+    vectors : (K, 3), unit vectors, reference frame.
+    """
+
+    label: str
+    times: Sequence[float]
+    vectors: Sequence[Sequence[float]]
+
+
+@dataclass(frozen=True)
 class Scene:
     """Say what a picture in space shows; what is left empty is not drawn.
 
@@ -87,7 +103,7 @@ class Scene:
     size, centre : (3,), [m], of the box that stands for the craft, in the frame of `turned`.
     turned : rows of the rotation from that frame to the body frame, (3, 3).
     jets, spinners, arrows : what pushes, spins and points.
-    directions : that stay, reference frame.
+    directions, tracks : that stay, and that move without being recorded, reference frame.
     """
 
     attitude: str = ""
@@ -104,6 +120,7 @@ class Scene:
     spinners: Spinners | None = None
     arrows: Sequence[Arrow] = ()
     directions: Sequence[Direction] = ()
+    tracks: Sequence[Track] = ()
 
     @classmethod
     def of(cls, state: Layout) -> Scene:

@@ -10,7 +10,7 @@ from casadi_gnc.reports.packed import Packed
 from casadi_gnc.reports.plots import labels, panels_of, plot, stretches
 from casadi_gnc.reports.records import Flown, Record
 from casadi_gnc.reports.thinning import runs
-from casadi_gnc.reports.told import ShownPanel, ShownScene, ShownScheme
+from casadi_gnc.reports.told import ShownPanel, ShownScene, ShownScheme, ShownTrack
 from casadi_gnc.reports.verdicts import gravity
 from casadi_gnc.status import StepStatus
 
@@ -89,7 +89,7 @@ def _scheme(
             }
             for one, p in zip(panels, plots, strict=True)
         ],
-        "scene": None if scheme is None else _scene(record, scheme, kept, lacking),
+        "scene": None if scheme is None else _scene(record, scheme, kept, lacking, record.time[chosen], packed),
     }
 
 
@@ -115,7 +115,9 @@ def _statuses(record: Record) -> list[dict[str, Any]]:
     return found
 
 
-def _scene(record: Record, scheme: ShownScheme, kept: Any, lacking: list[str]) -> dict[str, Any] | None:
+def _scene(
+    record: Record, scheme: ShownScheme, kept: Any, lacking: list[str], moments: np.ndarray, packed: Packed
+) -> dict[str, Any] | None:
     """Return what is seen in space; what the record lacks is left out, and said."""
     scene: ShownScene = scheme.scene
     wanted = [scene.attitude, scene.position, *(one.signal for one in scene.arrows)]
@@ -132,9 +134,19 @@ def _scene(record: Record, scheme: ShownScheme, kept: Any, lacking: list[str]) -
             if told[part]["a"] is None:
                 told[part] = None
     told["arrows"] = [one | {"a": kept(one["signal"])} for one in told["arrows"] if one["signal"] in record.signals]
+    told["arrows"] += [_track(one, moments, packed) for one in scene.tracks]
+    del told["tracks"]
     cone = next((one for one in scheme.panels if one.walls and one.signal == scene.attitude), None)
     walls = [] if cone is None or cone.walls is None else [kept(name) for name in cone.walls]
     told["cone"] = walls if walls and all(walls) else None
     if told["attitude"] is None and told["position"] is None:
         return None
     return told
+
+
+def _track(one: ShownTrack, moments: np.ndarray, packed: Packed) -> dict[str, Any]:
+    """Return a direction at the moments as an arrow of the reference frame."""
+    between = np.stack([np.interp(moments, one.times, column) for column in np.array(one.vectors).T])
+    size = np.linalg.norm(between, axis=0)
+    columns = [packed.add(column) for column in between / np.where(size > 0, size, 1.0)]
+    return {"signal": "", "label": one.label, "frame": "reference", "reversed": False, "a": columns}

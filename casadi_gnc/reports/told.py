@@ -75,6 +75,14 @@ class ShownDirection(Told):
     vector: Three
 
 
+class ShownTrack(Told):
+    """`casadi_gnc.missions.scene.Track`."""
+
+    label: str
+    times: list[FiniteFloat]
+    vectors: list[Three]
+
+
 class ShownScene(Told):
     """`casadi_gnc.missions.scene.Scene`."""
 
@@ -92,6 +100,7 @@ class ShownScene(Told):
     spinners: ShownSpinners | None
     arrows: list[ShownArrow]
     directions: list[ShownDirection] = []
+    tracks: list[ShownTrack] = []
 
 
 class ShownScheme(Told):

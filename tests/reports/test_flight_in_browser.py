@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import casadi_gnc
 from casadi_gnc.reports import flight_page
+from casadi_gnc.reports.told import ShownLoops
 from casadi_gnc.reports.writing import write_report
 from casadi_gnc.system.text import visible
 
@@ -194,7 +195,7 @@ def test_hostile_titles_show_as_text(browser, detumble, tmp_path, title):
     mission = replace(detumble.with_timing(duration=20.0), title=title, source=title)
     scheme = mission.with_scheme("observer_robust", title=title)
     flight = replace(casadi_gnc.fly(scheme), notes=(title,))
-    page = flight_page.of_mission(scheme, [flight], tmp_path / "a.html")
+    page = flight_page.of_mission(scheme, [flight], tmp_path / "a.html", ShownLoops())
     with opened(browser, page, width=400) as sheet:
         assert sheet.locator("h1").text_content() == visible(title)
         assert visible(title) in sheet.locator("#verdict").text_content()
@@ -240,16 +241,18 @@ def test_half_a_folder_is_shown_quietly(browser, flown, tmp_path):
         legible(sheet, 1280)
 
 
-@pytest.mark.parametrize("name", ["satellites/earth_pointing", "sun2018/circular_orbit"])
+@pytest.mark.parametrize("name", ["satellites/earth_pointing", "satellites/detumble_bdot", "sun2018/circular_orbit"])
 def test_other_craft(browser, name, tmp_path):
     mission = casadi_gnc.load(name).with_timing(duration=60.0)
     flight = casadi_gnc.fly(mission)
-    page = flight_page.of_mission(mission, [flight], tmp_path / "a.html")
+    page = flight_page.of_mission(mission, [flight], tmp_path / "a.html", ShownLoops())
     with opened(browser, page) as sheet:
         sheet.evaluate("report.moment(report.nearest(20))")
         keep(sheet, f"flight-{name.replace('/', '-')}")
         if name == "satellites/earth_pointing":
             assert {"down", "sun", "rate"} <= set(sheet.locator("#view .name").all_inner_texts())
+        elif name == "satellites/detumble_bdot":
+            assert {"field", "down", "sun", "rate"} <= set(sheet.locator("#view .name").all_inner_texts())
         else:
             # In the target's frame, from the record: r_e of the chaser's frame turned back, and the point held.
             time = float(sheet.locator("#clock").inner_text().removesuffix(" s"))

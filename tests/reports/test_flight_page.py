@@ -8,8 +8,10 @@ import shutil
 import subprocess
 import sys
 import time
+import zlib
 from dataclasses import replace
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -17,7 +19,10 @@ from scipy.optimize import linprog
 import casadi_gnc
 from casadi_gnc.errors import ReportError
 from casadi_gnc.reports import flight_page, records
+from casadi_gnc.reports.describing import described
+from casadi_gnc.reports.flight_data import data_of
 from casadi_gnc.reports.loops import loops_of
+from casadi_gnc.reports.packed import Packed
 from casadi_gnc.reports.told import ShownLoops
 from casadi_gnc.reports.writing import write_report
 from casadi_gnc.system.text import visible
@@ -240,6 +245,27 @@ def test_what_is_no_flight_is_told(tmp_path):
 
 
 CRAFT = ["huang2019/nominal", "sun2018/circular_orbit", "shi2020/docking", "tao2019/case1", "satellites/thruster_hold"]
+
+
+@pytest.mark.slow
+def test_the_field_is_drawn_where_it_is(tmp_path):
+    """Its direction at the recorded positions, a whole revolution, by the field's own function."""
+    mission = casadi_gnc.load("satellites/detumble_bdot")
+    flight = casadi_gnc.fly(mission, decimation=100)
+    packed = Packed()
+    flown = records.of_flights([flight], described(mission, [flight.scheme]), ShownLoops())
+    scene = data_of(flown, packed)["schemes"][0]["scene"]
+    (arrow,) = [one for one in scene["arrows"] if one["label"] == "field"]
+    numbers, ends = zlib.decompress(base64.b64decode(packed.letters())), np.cumsum([0, *packed.counts])
+    planes = [np.frombuffer(numbers[4 * ends[i] : 4 * ends[i + 1]], np.uint8).reshape(4, -1) for i in arrow["a"]]
+    drawn = np.stack([each.T.copy().view("<f4")[:, 0] for each in planes], axis=1)
+    moments = np.unique(np.round(np.linspace(0, len(flight.time) - 1, len(drawn))).astype(int))
+    t, r = ca.SX.sym("t"), ca.SX.sym("r", 3)
+    field = ca.Function("field", [t, r], [mission.craft.surroundings().field(t, r)])
+    for k, seen in list(zip(moments, drawn, strict=True))[::7]:
+        true = np.array(field(flight.time[k], flight["position"][k])).ravel()
+        angle = np.degrees(np.arccos(np.clip(seen @ true / np.linalg.norm(true) / np.linalg.norm(seen), -1, 1)))
+        assert angle < 0.5
 
 
 @pytest.mark.slow

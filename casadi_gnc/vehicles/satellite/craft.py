@@ -22,6 +22,7 @@ from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.mechanics.multibody import Assembly, Component
+from casadi_gnc.mechanics.orbits import EARTH_J2, Orbit
 from casadi_gnc.mechanics.reaction_wheels import TorqueGyrostat, WheelArray
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.mechanics.sensors import Sensor
@@ -29,7 +30,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import Craft, EffortKeys
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
-from casadi_gnc.missions.scene import Arrow, Direction, Jets, Scene, Spinners
+from casadi_gnc.missions.scene import Arrow, Direction, Jets, Scene, Spinners, Track
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
 from casadi_gnc.signals import Layout
@@ -46,6 +47,9 @@ from .plate_tables import AirTable, PlateTable
 from .reference_tables import AnyReference, timeline
 from .sensor_tables import AnySensor, made
 from .surroundings import SunDirection, Surroundings
+
+#: Seconds between points of the field along the orbit, one degree of which takes 15 s; and points at most.
+_APART, _MOST_OF_TRACK = 60.0, 721
 
 
 class Truth(Part):
@@ -299,8 +303,20 @@ class SatelliteCraft(Craft):
             [each.max_force_N for each in self.thruster],
         )
 
+    def _field_track(self, duration: float) -> list[Track]:
+        """Return the way of the magnetic field along the orbit, without what disturbs it but the Earth's oblateness."""
+        field = self.surroundings().field
+        if self.orbit is None or field is None:
+            return []
+        orbit, t = Orbit(self.orbit.elements(), EARTH_J2 if self.orbit.j2 else 0.0), ca.SX.sym("t")
+        times = np.linspace(0.0, duration, min(_MOST_OF_TRACK, 2 + int(duration / _APART)))
+        seen = ca.Function("seen", [t], [field(t, orbit.at(t)[0])]).map(len(times))
+        fields = np.array(seen(times[None])).T
+        directions = fields / np.linalg.norm(fields, axis=1)[:, None]
+        return [Track("field", np.round(times, 3).tolist(), np.round(directions, 5).tolist())]
+
     def scene(self, mission: Mission) -> Scene:
-        """Return the body with its wheels and thrusters, the way down and the way to the sun."""
+        """Return the body with its wheels and thrusters, the way down, to the sun and along the field."""
         inputs, sun = mission.truth.inputs, self._sun()
         away = np.abs([each.position_m for each in self.thruster]).max(axis=0) if self.thruster else np.full(3, 0.5)
         down = [] if self.orbit is None else [Arrow("position", "down", "reference", reversed=True)]
@@ -311,6 +327,7 @@ class SatelliteCraft(Craft):
             jets=self._jets() if "force" in inputs else None,
             spinners=Spinners("wheel_speed", [each.axis for each in self.wheel]) if self.wheel else None,
             arrows=[Arrow("rate", "rate"), *down],
+            tracks=self._field_track(mission.timing.duration),
             directions=[] if sun is None else [Direction("sun", np.array(ca.DM(sun(0.0))).ravel().tolist())],
         )
 
