@@ -143,7 +143,7 @@ def _metric(campaign: Campaign, metric: Metric, told: dict[str, Any], flew: np.n
     label = f"{metric.name.replace('_', ' ')}{unit}"
     marked = np.argsort(-badness(metric, values), kind="stable")[:_MARKED]
     drivers = [one for one in told.get("drivers", []) if one["rank_correlation"]["value"] is not None]
-    charts = [_histogram(campaign, metric, told, values, label)]
+    charts = [_histogram(campaign, metric, told, values, label)] if np.isfinite(values).any() else []
     if drivers:
         charts.append(_bars(drivers))
         charts += [

@@ -91,8 +91,8 @@ def _slice(one: ShownSlice) -> Chart:
             drawn.append(Drawn("thick" if colour == "c5" else "line", x, y, colour, name))
     if one.limit is not None:
         a, b = one.limit
-        box = np.array([[-a, -b], [a, -b], [a, b], [-a, b], [-a, -b]])
-        drawn.append(Drawn("line", *box.T, "quiet", "limit of the effort"))
+        box = [-a, a, a, -a, -a], [-b, -b, b, b, -b]
+        drawn.append(Drawn("line", box[0], box[1], "quiet", "limit of the effort"))
     across = Axis(one.across, *around(*[each.x for each in drawn]))
     up = Axis(one.up, *around(*[each.y for each in drawn]))
     return Chart("Attainable, the rest at zero", across, up, drawn)
