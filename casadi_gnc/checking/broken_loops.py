@@ -15,7 +15,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import loop_at, moving_rows, rows_of, unlimited
+from casadi_gnc.checking.linear import held, loop_at, moving_rows, rows_of, unlimited
 from casadi_gnc.checking.margins import BrokenLoop, Margins, common_gain, disk_of_all, margins
 from casadi_gnc.checking.sampling import settled
 from casadi_gnc.errors import FlightError
@@ -50,13 +50,14 @@ class SchemeMargins:
 
 
 def scheme_margins(mission: Mission, scheme: Scheme) -> SchemeMargins:
-    """Return the margins of a scheme at its target, sampled as it flies.
+    """Return the margins of a scheme at its target, held still where it moves, sampled as it flies.
 
     Raises
     ------
     FlightError
         Where the mission has no target, the law no slope there, or the loop is not stable at it.
     """
+    mission, scheme = held(mission, scheme)
     if not mission.target:
         raise FlightError(f"{mission.name} says no target at which its loop could be cut")
     at = settled(mission)

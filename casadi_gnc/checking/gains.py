@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from casadi_gnc.checking.linear import loop_at, spectral_radius
+from casadi_gnc.checking.linear import HELD, held, loop_at, spectral_radius
 from casadi_gnc.checking.sampling import ROUNDING
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
@@ -16,9 +16,10 @@ from casadi_gnc.missions.scheme import Scheme
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield the conditions of the law's source, then the sign of its anti-windup loop."""
     yield from scheme.law.checks()
-    if not mission.target or not scheme.law.memory.size:
+    still, own = held(mission, scheme)
+    if not still.target or not scheme.law.memory.size:
         return
-    loop = loop_at(mission, scheme, 0.0)
+    loop = loop_at(still, own, 0.0)
     if not loop.exists:
         return
     memory = loop.memory_when_saturated
@@ -34,5 +35,6 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
         "fail",
         "While the actuators are at their limit the law's memory feeds itself: once saturated, always saturated.",
         "Turn the sign of the compensation, or let its decay exceed its gain.",
-        "poles of the memory with measurement and achieved effort standing still",
+        "poles of the memory with measurement and achieved effort standing still"
+        + (f"; {HELD}" if still is not mission else ""),
     )

@@ -1,8 +1,8 @@
 """The closed loop, linearised at its target with actuators that do what they are told.
 
 What a craft regulates (`Mission.target`) and the law's memory are the state; everything else of the
-plant stays as at the start. Sampled, one step of the map is one sample period; continuous, the
-slope is that of plant and law together.
+plant stays as at the start. A target that moves is held still where it is at the start (`held`). Sampled, one step of
+the map is one sample period; continuous, the slope is that of plant and law together.
 """
 
 from __future__ import annotations
@@ -20,6 +20,20 @@ from casadi_gnc.allocation import leaves_none_out
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
+
+#: What is said of a check that looks at a target which does not move as it does in flight.
+HELD = "the reference held still as it is at the start"
+
+
+@lru_cache(maxsize=4)
+def _still(mission: Mission) -> Mission:
+    return mission.craft.held(mission) or mission
+
+
+def held(mission: Mission, scheme: Scheme) -> tuple[Mission, Scheme]:
+    """Return what is linearised: the mission and its scheme, or those with a target that moves held still."""
+    still = _still(mission)
+    return (mission, scheme) if still is mission else (still, still.scheme(scheme.name))
 
 
 def rows_of(mission: Mission) -> list[int]:

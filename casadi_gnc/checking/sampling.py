@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import loop_at, spectral_radius
+from casadi_gnc.checking.linear import HELD, held, loop_at, spectral_radius
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import LawError
 from casadi_gnc.laws import Law
@@ -29,8 +29,13 @@ def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield jumps inside steps, and the stability of the linearised loop at both ends of the flight and delayed."""
     yield from _hold(scheme)
     yield from _jumps(mission, scheme)
-    if not mission.target:
-        return
+    still, own = held(mission, scheme)
+    if still.target:
+        for each in _linear(still, own):
+            yield each if still is mission else replace(each, source=f"{each.source}; {HELD}")
+
+
+def _linear(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     loops = [loop_at(mission, scheme, t) for t in (0.0, settled(mission))]
     # Printed laws may have gains beyond all numbers late in the flight: that is a finding, not a gap.
     if not loops[0].exists:

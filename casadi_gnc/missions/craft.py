@@ -115,6 +115,10 @@ class Craft(Part):
         """Return the states that the laws regulate, by name, and the values that they bring them to."""
         return {}
 
+    def held(self, mission: Mission) -> Mission | None:
+        """Return the mission with its target held still, where the target moves; the linear checks look at that."""
+        return None
+
     def panels(self, mission: Mission) -> Sequence[Panel]:
         """Return what a flight's picture shows: what is measured, the efforts, the actuators."""
         plant, effort, goals = mission.truth, mission.schemes[0].actuation.effort, self.regulated(mission)

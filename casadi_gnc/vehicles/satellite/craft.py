@@ -30,6 +30,7 @@ from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import Craft, EffortKeys
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
+from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.scene import Arrow, Direction, Jets, Scene, Spinners, Track
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
@@ -44,7 +45,7 @@ from .orbit_tables import Environment, FieldTable, OrbitTable
 from .part_tables import FlexibleModeTable, MagnetorquerTable, MomentumTable, SloshTable, ThrusterTable, WheelTable
 from .plant import Satellite
 from .plate_tables import AirTable, PlateTable
-from .reference_tables import AnyReference, timeline
+from .reference_tables import AnyReference, InertialTable, timeline
 from .sensor_tables import AnySensor, made
 from .surroundings import SunDirection, Surroundings
 
@@ -218,13 +219,14 @@ class SatelliteCraft(Craft):
             self.pointed(),
         )
 
+    def _place(self) -> dict[str, Any]:
+        """Return position and velocity at t = 0, where there is an orbit."""
+        known = self.orbit
+        return {} if known is None else dict(zip(("position", "velocity"), known.elements().state(), strict=True))
+
     def start(self) -> dict[str, Any]:
         """Return the state at t = 0."""
-        place = (
-            {}
-            if self.orbit is None
-            else dict(zip(("position", "velocity"), self.orbit.elements().state(), strict=True))
-        )
+        place = self._place()
         turned, rate = self.initial.quaternion(), self.initial.rate()
         if self.initial.relative_to == "reference":
             wanted = self.pointed().at(0.0, SimpleNamespace(**place))
@@ -279,6 +281,18 @@ class SatelliteCraft(Craft):
             return {}
         still = array(pointed.at(0.0, None).quaternion)
         return {"mrp": quaternions.to_mrp(still).elements(), "rate": [0.0] * 3}
+
+    def held(self, mission: Mission) -> Mission | None:
+        """Return the mission with the attitude that is wanted at t = 0 for good, where the reference moves."""
+        if type(self.pointed()) in (Reference, Inertial):
+            return None
+        first = array(self.pointed().at(0.0, SimpleNamespace(**self._place())).quaternion)
+        still = self.model_copy(
+            update={"reference": [InertialTable(kind="inertial", quaternion_scalar_first=ca.DM(first).elements())]}
+        )
+        parts = Parts(still)
+        schemes = [replace(one, navigation=parts.navigation if one.navigation else None) for one in mission.schemes]
+        return replace(mission, craft=still, schemes=schemes, parts=parts)
 
     def panels(self, mission: Mission) -> tuple[Panel, ...]:
         """Return pointing, rate, torque, and what makes it."""

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import loop_at, rows_of, spectral_radius
+from casadi_gnc.checking.linear import held, loop_at, rows_of, spectral_radius
 from casadi_gnc.checks import Check
 from casadi_gnc.mechanics import earth, quaternions
 from casadi_gnc.mechanics.orbits import Orbit
@@ -59,8 +59,9 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[
     limit = wanted(mission)
     if limit is None:
         return
-    if scheme.actuation.modulation is not None and mission.target:
-        turned = limit_cycle(craft, mission, scheme)
+    still, own = held(mission, scheme)
+    if scheme.actuation.modulation is not None and still.target:
+        turned = limit_cycle(craft, still, own)
         if turned is not None:
             yield Check(
                 "authority.pulse_limit_cycle",
