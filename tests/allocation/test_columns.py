@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from casadi_gnc.allocation import AllocationProblem, AllocationStatus, Allocator, backends
+from casadi_gnc.allocation.answer import ACCURACIES, certify, floor_of
 from casadi_gnc.allocation.online import OnlineSolver
 
 
@@ -87,6 +88,22 @@ def exact_gap(problem, forces, weights, command):
         d = min(max(-g / 2, Fraction(problem.lower[i]) - f), Fraction(problem.upper[i]) - f)
         gap -= g * d + d * d
     return float(gap), float(h * sum(m * m for m in missing) + sum(f * f for f in F))
+
+
+def test_forces_that_cost_a_million_times_the_least_are_never_certified_at_the_floor():
+    """A torque of 0.01 from a strong actuator costs 1e-5^2, from the weak one 0.01^2, by hand; the floor is 1."""
+    problem, torque = AllocationProblem([[1e3, 1.0]], -1.0, 1.0, accuracy_weight=1e4, change_weight=0.0), 0.01
+    sample = (np.array([torque]), np.zeros(2))
+    best = 1e4 * np.array([1e3, 1.0]) * torque / (1 + 1e4 * (1e6 + 1))  # F = h A' (u - A F)
+    for forces, status in (
+        (best, AllocationStatus.OPTIMAL),
+        ([0.0, torque], AllocationStatus.NOT_CERTIFIED),
+        (best * 1.01, AllocationStatus.NOT_CERTIFIED),  # misses 1e-4: costs 1e-4 and not 1e-10
+    ):
+        box = (problem.lower, problem.upper)
+        cost, gap, _, judged = certify(problem, *sample, np.array(forces), None, ACCURACIES["mid"], box)
+        assert judged is status, (forces, cost, gap)
+    assert floor_of(problem, sample[0], ACCURACIES["mid"]) == pytest.approx(1.0, rel=0.01)
 
 
 def test_the_certificate_is_that_of_exact_arithmetic():

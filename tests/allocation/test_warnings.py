@@ -1,8 +1,9 @@
-"""Warnings of allocation files: rank of the actuators that can move, and forces that can never be reached."""
+"""What allocation files are warned of or refused for: rank, forces never reached, faults that cannot be, no numbers."""
 
 import numpy as np
 import pytest
 
+from casadi_gnc.errors import GncError
 from casadi_gnc.problem_files.allocation_file import load_allocation
 
 ROTORS = [
@@ -45,3 +46,28 @@ def test_an_axis_that_is_nearly_lost_is_told(tmp_path, part, near):
 def test_a_least_force_that_is_never_reached_is_told(tmp_path):
     (told,) = warnings(tmp_path, [[1.0, -1.0]], "max_rate_per_s = 2.0\n[options]\nleast_force_N = 0.3\n")
     assert "from rest actuators 1, 2 can never make as much" in told  # 2 N/s for 0.1 s
+
+
+def test_a_stuck_force_beyond_the_bounds_is_told(tmp_path):
+    """What is stuck makes its force whatever the bounds; at a bound it is no surprise."""
+    (told,) = warnings(tmp_path, [[1.0, -1.0, 0.5]], "[faults]\nstuck = [{ actuator = 2, force_N = 40.0 }]\n")
+    assert told == "actuator 2 is stuck at 40, outside its own bounds, 0 to 1"
+    assert not warnings(tmp_path, [[1.0, -1.0, 0.5]], "[faults]\nstuck = [{ actuator = 2, force_N = 1.0 }]\n")
+
+
+def test_two_faults_of_one_actuator_are_refused(tmp_path):
+    stuck = "stuck = [{ actuator = 2, force_N = 0.5 }"
+    with pytest.raises(GncError, match="actuator 2 is both dead and stuck; keep one"):
+        warnings(tmp_path, [[1.0, -1.0]], f"[faults]\ndead = [2]\n{stuck}]\n")
+    with pytest.raises(GncError, match="actuator 2 is stuck twice; keep one"):
+        warnings(tmp_path, [[1.0, -1.0]], f"[faults]\n{stuck}, {{ actuator = 2, force_N = 0.1 }}]\n")
+
+
+@pytest.mark.parametrize(
+    ("given", "shown", "finite"),
+    [("inf", "is inf", "finite "), ("nan", "is nan", "finite "), ('"5"', "is '5'", ""), ("true", "is true", "")],
+)
+def test_a_number_or_a_list_is_asked_for_in_one_sentence(tmp_path, given, shown, finite):
+    expected = f"line 7, matrices.max_rate_per_s: {shown}, expected a {finite}number or a list of such"
+    with pytest.raises(GncError, match=f"{expected}; leave it out for none$"):
+        warnings(tmp_path, [[1.0, -1.0]], f"max_rate_per_s = {given}\n")
