@@ -13,6 +13,7 @@ from casadi_gnc.problem_files.synthesis_file import load_synthesis
 
 GOOD = read("huang2020/detumble").text
 SLEW = read("huang2020/slew").text
+DOCKING = read("shi2020/docking").text
 INERTIA = "[[0.49019, 0.0, 0.0], [0.0, 1.2089, 0.0], [0.0, 0.0, 1.2916]]"
 ANGLES = "rotation_321_rad = [0.7853981633974483, 0.4487989505128276, 1.0471975511965976] # pi/4, pi/7, pi/3"
 PRINTED = "rotation = [[0.63708, 0.63708, -0.43388], [-0.87855, 0.61925, 0.78026], [0.76577, -0.45897, 0.45048]]"
@@ -57,6 +58,8 @@ CASES = {
     "endless": (GOOD, "duration_s = 1500.0", "duration_s = 1e308", "expected a whole number up to 1e9"),
     "incredible start": (GOOD, "rate_rad_per_s = [0.45,", "rate_rad_per_s = [45.0,", "line LINE, initial.rate_rad_per_s: 45 is beyond the largest credible rate, 10"),
     "deep nesting": (GOOD, "format = 1", "format = " + "[" * 3000, "is not valid TOML"),
+    "endless digits": (GOOD, "duration_s = 1500.0", "duration_s = 1" + 4400 * "0", "line LINE: is not valid TOML: this line has a number of very many digits"),
+    "gains that overflow inside": (DOCKING, "[-0.00016, 0.0, -0.42865,", "[1e308, 0.0, -0.42865,", r"scheme\[1\].law: IntermediateObserver cannot be made of these gains: they overflow, or leave a matrix without"),
     "one funnel": (SLEW, "[[funnel]]", "[funnel]", r"line LINE, funnel: there may be several funnels; write \[\[funnel\]\]"),
     "two funnels": (SLEW, "[timing]", SLEW[SLEW.index("[[funnel]]") : SLEW.index("[timing]")] + "[timing]", "'mrp' has two funnels"),
     "noise period": (GOOD, "[timing]", "[noise]\nperiod_s = 0.25\n\n[timing]", r"line 5\d, noise.period_s: period_s is 0.25, 2.5 times sample_period_s 0.1; expected a whole multiple"),
@@ -170,3 +173,12 @@ def test_thrusters_that_leave_an_axis_out_are_refused(tmp_path):
 def test_names_that_are_no_files(name):
     with pytest.raises(ProblemError, match="names no file|no problem file"):
         casadi_gnc.load(name)
+
+
+def test_lists_of_a_synthesis_are_not_empty(tmp_path):
+    text = read("shi2020/synthesis").text
+    path = tmp_path / "bad.toml"
+    path.write_text(re.sub(r"half_widths = \[.*?\]", "half_widths = []", text))
+    line = text[: text.index("half_widths = ")].count("\n") + 1
+    with pytest.raises(ProblemError, match=f"bad.toml, line {line}, recipe.half_widths: has 0 entries, expected at l"):
+        load_synthesis(path)
