@@ -31,8 +31,8 @@ LEAST = 1e-4
 #: How far points are drawn about an iterate where no step helps, in units of the radius.
 _SHRINK = (1.0, 0.3, 0.1)
 _DRAWN = 24
-#: Points all over the bounds before the first step, for each gain, and at most.
-_SPREAD, _MOST_SPREAD = 16, 64
+#: Points all over the bounds before the first step: so many, twice for each gain, and at most.
+_SPREAD, _MOST_SPREAD = 8, 128
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def descend(problem: Problem, at: Iterate, iterations: int, seed: int = 0) -> It
 
 def _spread(problem: Problem, at: Iterate, seed: int) -> Iterate:
     """Return the best of the iterate and of points all over the bounds: costs of whole flights have many valleys."""
-    cube = Sobol(len(at.z)).points(seed, 0, min(_SPREAD * len(at.z), _MOST_SPREAD))
+    cube = Sobol(len(at.z)).points(seed, 0, min(_SPREAD * 2 ** len(at.z), _MOST_SPREAD))
     best = _best(problem, at, problem.low + cube * (problem.high - problem.low))
     if best is None:
         return replace(at, number=1, how="spread")
