@@ -105,6 +105,8 @@ def test_quiet_and_legible(browser, page, width, scheme):
     with opened(browser, page, width=width, scheme=scheme) as sheet:
         assert sheet.locator("figure.chart").count() >= 8
         legible(sheet, width)
+        assert sheet.locator("td", has_text="<b>quick</b>").count() == 1
+        assert sheet.locator("td b").count() == 0
         keep(sheet, f"campaign-{width}-{scheme}")
 
 

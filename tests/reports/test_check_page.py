@@ -12,6 +12,7 @@ from casadi_gnc.checking import check
 from casadi_gnc.problem_files.checking import checked_file
 from casadi_gnc.reports.check_page import of_checks
 from casadi_gnc.reports.writing import write_report
+from casadi_gnc.system.text import visible
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,18 @@ def test_quiet_and_legible(browser, page, width, scheme):
         assert sheet.locator("figure.chart").count() == 12
         legible(sheet, width)
         keep(sheet, f"check-{width}-{scheme}")
+
+
+@pytest.mark.tools("chromium")
+@pytest.mark.packages("playwright")
+@pytest.mark.parametrize(
+    "title", ["</title><script>alert(1)</script>\"'" + chr(0x202E), 10_000 * "x"], ids=["script", "long"]
+)
+def test_hostile_titles_show_as_text(browser, found, tmp_path, title):
+    with opened(browser, of_checks(title, found.checks, tmp_path / "a.html"), width=400) as sheet:
+        assert sheet.locator("h1").text_content() == visible(title)
+        assert sheet.evaluate("document.documentElement.scrollWidth") <= 400
+        assert sheet.evaluate("document.querySelectorAll('script').length") == 0
 
 
 def test_a_problem_by_its_name(tmp_path):

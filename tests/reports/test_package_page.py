@@ -58,4 +58,6 @@ def test_quiet_and_legible(browser, tmp_path, width, scheme):
     page = of_verification(found(), tmp_path / "a.html")
     with opened(browser, page, width=width, scheme=scheme) as sheet:
         legible(sheet, width)
+        assert sheet.locator("h1").text_content() == "<i>Slew</i><U+202E>"
+        assert sheet.locator("main i").count() == 0
         keep(sheet, f"package-{width}-{scheme}")
