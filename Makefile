@@ -140,10 +140,11 @@ lock: $(UV)
 	$(COMPILE) --extra dev --extra docs --constraints requirements-oracles.lock --output-file requirements-dev.lock
 	$(COMPILE) --constraints requirements-oracles.lock --output-file requirements.lock
 
+# Matplotlib before 3.10.8 calls functions that pyparsing 3.3 warns of.
 .venv-oldest/installed: pyproject.toml | $(UV)
 	@echo "Installing the oldest packages that pyproject.toml allows into .venv-oldest: about a minute."
 	$(PYTHON) -m venv .venv-oldest
-	$(UV) pip install --quiet --python .venv-oldest/bin/python --resolution lowest-direct --group build --editable '.[dev]'
+	$(UV) pip install --quiet --python .venv-oldest/bin/python --resolution lowest-direct --group build --editable '.[dev]' 'pyparsing<3.3'
 	touch $@
 
 clean:

@@ -101,7 +101,10 @@ class BrokenLoop:
         """Return L at frequencies [rad/s], (..., channels, channels), complex."""
         s = 1j * np.asarray(frequencies)[..., None, None]
         z = np.exp(s * self.period) if self.period else s
-        return -(self.C @ np.linalg.solve(z * np.eye(len(self.A)) - self.A, self.B) + self.D)
+        stack = z * np.eye(len(self.A)) - self.A
+        # As many right-hand sides as matrices: NumPy 1 takes a single one for a vector.
+        right = np.broadcast_to(self.B, (*stack.shape[:-2], *self.B.shape))
+        return -(self.C @ np.linalg.solve(stack, right) + self.D)
 
     def closed(self, factor: complex = 1.0) -> np.ndarray:
         """Return the matrix of the loop closed by u = factor w in every channel."""

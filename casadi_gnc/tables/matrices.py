@@ -51,7 +51,7 @@ def check_inertia(rows: Rows) -> Rows:
     return rows
 
 
-def check_unit(vector: list[float], prefix: str = "") -> list[float]:
+def check_unit(vector: list[float], *, prefix: str = "") -> list[float]:
     """Return a direction as it came; raise `ValueError` if it has not length 1. Symbols may have any."""
     if not all(map(is_number, vector)):
         return vector

@@ -23,7 +23,7 @@ class Thrusters(Part):
     @field_validator("directions")
     @classmethod
     def _are_units(cls, value: list[list[float]]) -> list[list[float]]:
-        return [matrices.check_unit(row, f"thruster {i}: ") for i, row in enumerate(value, 1)]
+        return [matrices.check_unit(row, prefix=f"thruster {i}: ") for i, row in enumerate(value, 1)]
 
     @model_validator(mode="after")
     def _fit(self) -> Thrusters:

@@ -27,7 +27,7 @@ class Wheels(Part):
     @field_validator("axes")
     @classmethod
     def _are_units(cls, value: list[list[float]]) -> list[list[float]]:
-        return [matrices.check_unit(row, f"wheel {i}: ") for i, row in enumerate(value, 1)]
+        return [matrices.check_unit(row, prefix=f"wheel {i}: ") for i, row in enumerate(value, 1)]
 
     @model_validator(mode="after")
     def _one_of_each(self) -> Wheels:

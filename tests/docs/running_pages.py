@@ -25,6 +25,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 #: Commands by which a section makes what later ones stand on.
 _MAKES = re.compile(r"^(casadi-gnc (new|problems copy|generate)|mkdir|cp|mv|sed|printf) ")
+#: Warnings are errors. Said in Python: at the option -W error pyparsing, below Matplotlib, warns of its own innards.
+_STRICT = "import warnings; warnings.simplefilter('error')\n"
 _BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.DOTALL | re.MULTILINE)
 _FILE = re.compile(r"`([\w./-]+\.\w+)`:$")
 
@@ -84,7 +86,7 @@ def run(page: str, title: str, folder: Path, **environment: str) -> None:
                 commands = [line for line in _lines(block.text) if last or _makes(line)]
                 said = "".join(_command(line, folder, environment) for line in commands)
             elif block.language == "python" and last:
-                said = _told([sys.executable, "-W", "error", "-c", block.text], 0, folder, environment)
+                said = _told([sys.executable, "-c", _STRICT + block.text], 0, folder, environment)
             elif block.language == "text" and last:
                 assert said is not None, f"nothing ran before {block.text!r}"
                 _compare(block.text, said)

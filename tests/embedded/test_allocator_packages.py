@@ -52,7 +52,7 @@ def package(tmp_path_factory) -> Path:
 def numbers(package: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return inputs, outputs and status of the shipped samples."""
     inputs, outputs = read_vectors(package, "float64")
-    return inputs.view(float), np.ascontiguousarray(outputs[:, :-1]).view(float), outputs[:, -1]
+    return inputs.view(float), np.ascontiguousarray(outputs[:, :-1]).view(float), outputs[:, -1].astype(np.int64)
 
 
 def test_words_are_those_of_the_python_back_end_and_faults_keep_the_certificate(package):

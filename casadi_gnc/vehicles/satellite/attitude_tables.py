@@ -43,7 +43,7 @@ class Attitude(Part):
             told = " and ".join((["axis"] if self.axis is not None else []) + angles)
             raise ValueError(f"an axis needs one angle, angle_deg or angle_rad, and an angle an axis; there is {told}")
         if self.axis is not None and all(exact.is_number(value) for value in self.axis):
-            matrices.check_unit(self.axis, "axis: ")
+            matrices.check_unit(self.axis, prefix="axis: ")
         for name in ways[:2]:
             value = getattr(self, name)
             if value is not None and abs(math.hypot(*value) - 1) > _UNIT:

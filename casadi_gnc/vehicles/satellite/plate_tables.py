@@ -25,7 +25,7 @@ class PlateTable(Part):
 
     @model_validator(mode="after")
     def _possible(self) -> PlateTable:
-        matrices.check_unit(self.normal, "normal: ")
+        matrices.check_unit(self.normal, prefix="normal: ")
         if self.mirrored + self.scattered > 1:
             total = self.mirrored + self.scattered
             raise ValueError(f"mirrored and scattered together are {total:g} of the light, expected at most 1")

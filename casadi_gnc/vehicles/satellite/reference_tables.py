@@ -48,7 +48,7 @@ class SunTable(Part):
 
     def reference(self, epoch: Epoch | None) -> Reference:
         """Return the reference."""
-        matrices.check_unit(self.axis, "axis: ")
+        matrices.check_unit(self.axis, prefix="axis: ")
         return SunPointing(_known(epoch, "sun"), self.axis)
 
 

@@ -109,7 +109,7 @@ class SunSensorTable(SensorTable):
 
     def sensor(self, wheels: int) -> SunSensor:
         """Return the sun sensor."""
-        matrices.check_unit(self.axis, "axis: ")
+        matrices.check_unit(self.axis, prefix="axis: ")
         shared = self._shared()
         return SunSensor(
             self.name, deviation=self.deviation_rad, axis=tuple(self.axis), view=DEGREE * self.view_deg, **shared
