@@ -14,6 +14,7 @@ from casadi_gnc.problem_files.synthesis_file import load_synthesis
 GOOD = read("huang2020/detumble").text
 SLEW = read("huang2020/slew").text
 DOCKING = read("shi2020/docking").text
+WHEELS = read("huang2019/nominal").text
 INERTIA = "[[0.49019, 0.0, 0.0], [0.0, 1.2089, 0.0], [0.0, 0.0, 1.2916]]"
 ANGLES = "rotation_321_rad = [0.7853981633974483, 0.4487989505128276, 1.0471975511965976] # pi/4, pi/7, pi/3"
 PRINTED = "rotation = [[0.63708, 0.63708, -0.43388], [-0.87855, 0.61925, 0.78026], [0.76577, -0.45897, 0.45048]]"
@@ -60,6 +61,7 @@ CASES = {
     "deep nesting": (GOOD, "format = 1", "format = " + "[" * 3000, "is not valid TOML"),
     "endless digits": (GOOD, "duration_s = 1500.0", "duration_s = 1" + 4400 * "0", "line LINE: is not valid TOML: this line has a number of very many digits"),
     "gains that overflow inside": (DOCKING, "[-0.00016, 0.0, -0.42865,", "[1e308, 0.0, -0.42865,", r"scheme\[1\].law: IntermediateObserver cannot be made of these gains: they overflow, or leave a matrix without"),
+    "thousands of wheels": (WHEELS, "axes = [", "axes = [" + 3000 * "[1, 0, 0], ", r"line LINE, spacecraft.wheels.axes: has 3004 entries, expected at most \d+$"),
     "one funnel": (SLEW, "[[funnel]]", "[funnel]", r"line LINE, funnel: there may be several funnels; write \[\[funnel\]\]"),
     "two funnels": (SLEW, "[timing]", SLEW[SLEW.index("[[funnel]]") : SLEW.index("[timing]")] + "[timing]", "'mrp' has two funnels"),
     "noise period": (GOOD, "[timing]", "[noise]\nperiod_s = 0.25\n\n[timing]", r"line 5\d, noise.period_s: period_s is 0.25, 2.5 times sample_period_s 0.1; expected a whole multiple"),
