@@ -178,7 +178,10 @@ def test_interrupted_flight_leaves_no_half_file(tmp_path):
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
-    time.sleep(3)
+    until = time.monotonic() + 120
+    while not out.is_dir() and time.monotonic() < until:
+        time.sleep(0.1)
+    time.sleep(3)  # it flies now
     flight.send_signal(signal.SIGINT)
     _, errors = flight.communicate(timeout=60)
     assert flight.returncode == 130, errors
