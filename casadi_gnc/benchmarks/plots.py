@@ -72,5 +72,5 @@ def _spread(axes: Any, times: dict[str, np.ndarray], limit: float) -> None:
     axes.set_xscale("log")
     axes.set_xlabel("warm solve [us]: least, 5 to 95 %, median, largest")
     axes.set_yticks([])
-    axes.invert_yaxis()
+    axes.set_ylim(len(times) - 0.5, -0.5)
     axes.grid(axis="y", visible=False)
