@@ -7,7 +7,6 @@ was commanded. A cut at the measurements has what is measured on one side and wh
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -15,10 +14,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import held, loop_at, moving_rows, rows_of, unlimited
+from casadi_gnc.checking.linear import held, loop_at, moving_rows
 from casadi_gnc.checking.margins import BrokenLoop, Margins, common_gain, disk_of_all, margins
 from casadi_gnc.checking.sampling import settled
 from casadi_gnc.errors import FlightError
+from casadi_gnc.missions.linear_plant import names_of, rows_of, unlimited
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
@@ -69,7 +69,7 @@ def scheme_margins(mission: Mission, scheme: Scheme) -> SchemeMargins:
         )
     channels = {}
     for loop, layout in ((efforts, scheme.actuation.effort), (sensors, read_by(mission, scheme))):
-        for i, name in enumerate(_names(layout)):
+        for i, name in enumerate(names_of(layout)):
             cut = loop.channel(i)
             if np.any(cut.B) and np.any(cut.C):  # a channel that is read and moves something
                 channels[name] = margins(cut)
@@ -143,8 +143,3 @@ def _slopes(mission: Mission, scheme: Scheme) -> ca.Function:
     ]
     at_rest = ca.substitute(slopes, [effort], [ca.SX.zeros(effort.numel())])
     return ca.Function("slopes", [s.t, s.x, s.m, seen], at_rest)
-
-
-def _names(layout: Layout) -> Iterator[str]:
-    for signal in layout.signals:
-        yield from (f"{signal.name} {row + 1}" if signal.size > 1 else signal.name for row in range(signal.size))

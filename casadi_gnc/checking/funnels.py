@@ -18,8 +18,9 @@ import numpy as np
 
 from casadi_gnc.checking import flown, programs
 from casadi_gnc.checking.authority import believed
-from casadi_gnc.checking.linear import driven_at_the_end, target_state
+from casadi_gnc.checking.linear import driven_at_the_end
 from casadi_gnc.checks import Check
+from casadi_gnc.missions.linear_plant import target_state
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Funnel, Scheme
 

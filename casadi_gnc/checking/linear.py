@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from scipy import linalg
 
-from casadi_gnc.allocation import leaves_none_out
+from casadi_gnc.missions.linear_plant import rows_of, target_state, unlimited
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
@@ -34,23 +34,6 @@ def held(mission: Mission, scheme: Scheme) -> tuple[Mission, Scheme]:
     """Return what is linearised: the mission and its scheme, or those with a target that moves held still."""
     still = _still(mission)
     return (mission, scheme) if still is mission else (still, still.scheme(scheme.name))
-
-
-def rows_of(mission: Mission) -> list[int]:
-    """Return the rows of the plant's state that the laws regulate."""
-    return [row for name in mission.target for row in _rows(mission.truth.state.place(name))]
-
-
-def _rows(place: slice) -> range:
-    return range(place.start, place.stop)
-
-
-def target_state(mission: Mission) -> np.ndarray:
-    """Return the plant's state at the target: what is regulated there, the rest as at the start."""
-    x = np.array(mission.start, dtype=float)
-    for name, values in mission.target.items():
-        x[mission.truth.state.place(name)] = values
-    return x
 
 
 #: Steps with which a continuous loop is followed at most; exact for a load that is held over each.
@@ -251,14 +234,6 @@ def _moved(mission: Mission) -> ca.Function:
     loop = Loop(mission, mission.schemes[0], averaged=True)
     s, moves = loop.symbols(), loop.held if mission.timing.mode == "sampled" else loop.moved
     return ca.Function("moved", [s.t, s.x, s.actuators], [moves(s.t, s.x, s.actuators, mission.quiet())])
-
-
-def unlimited(mission: Mission, scheme: Scheme, y: Any, wanted: Any) -> Any:
-    """Return the least actuator commands that make the wanted effort, or come nearest to it, bounds left out."""
-    matrix = scheme.actuation.matrix(mission.truth.measurement.split(y))
-    if not leaves_none_out(matrix):
-        return ca.mtimes(ca.DM(np.linalg.pinv(np.array(ca.DM(matrix)))), wanted)
-    return ca.mtimes(matrix.T, ca.solve(ca.mtimes(matrix, matrix.T), wanted))
 
 
 def _without_still(matrix: np.ndarray, sampled: bool) -> np.ndarray:

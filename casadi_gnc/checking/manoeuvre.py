@@ -15,8 +15,8 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import target_state
 from casadi_gnc.checks import Check
+from casadi_gnc.missions.linear_plant import target_state
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.recording import funnel_signals
 from casadi_gnc.missions.rehearsing import rehearsal

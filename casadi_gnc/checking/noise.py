@@ -8,8 +8,9 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.checking.allocation import allocation_slope, pushes_both_ways
-from casadi_gnc.checking.linear import command_slope, target_state
+from casadi_gnc.checking.linear import command_slope
 from casadi_gnc.checks import Check
+from casadi_gnc.missions.linear_plant import target_state
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 

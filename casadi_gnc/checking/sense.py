@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import rows_of, target_state
 from casadi_gnc.checks import Check
+from casadi_gnc.missions.linear_plant import rows_of, target_state
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 

@@ -13,7 +13,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import rows_of, target_state
+from casadi_gnc.missions.linear_plant import rows_of, target_state
 from casadi_gnc.missions.mission import Mission
 
 #: Times of the flight at which loads are looked at.

@@ -21,6 +21,7 @@ from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions import fitting, functions, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
+from casadi_gnc.missions.linear_plant import LinearPlant, linear_plant
 from casadi_gnc.missions.origin import Origin, keys_of_timing
 from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.plant import Plant
@@ -214,6 +215,16 @@ class Mission:
     def plant(self) -> ca.Function:
         """Return x' as a function (t, x, actuators) -> rate without noise, with the ports of the plant's layouts."""
         return functions.plant_rate(self)
+
+    def linearised(self, scheme: str | None = None, at_s: float = 0.0) -> LinearPlant:
+        """Return A and B of the plant at its target at a time [s], by the efforts of a scheme; see `LinearPlant`.
+
+        Raises
+        ------
+        FlightError
+            Where the mission has no target, or the plant no slope there.
+        """
+        return linear_plant(self, self.scheme(scheme), at_s)
 
     def law(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
         """Return the law as (t, y, m, achieved, [p]) -> (wanted, rate of memory, shown signals).

@@ -7,101 +7,31 @@ what was found with its certificate. A recipe of your own is derived from `Recip
 
 from __future__ import annotations
 
-from pathlib import Path
-from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any
 
-import numpy as np
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 
 from casadi_gnc import synthesis
-from casadi_gnc.errors import ProblemError
+from casadi_gnc.problem_files.recipe_parts import (
+    Damping,
+    Decay,
+    Disc,
+    Fastest,
+    HalfWidths,
+    OfPlant,
+    Recipe,
+    one_of_starts,
+)
 from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis import LmiAnswer, Synthesis
 from casadi_gnc.synthesis.recipes.shi2020_theorem1 import theorem1
-from casadi_gnc.system.matrix_file import read_matrix
-from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Table
+from casadi_gnc.tables.part import NonNegative, Positive, Table
 
 
-class Recipe(Part):
-    """Base of all recipes.
-
-    A key that takes a matrix also takes a file beside the problem file: "plant.csv", or "plant.mat:A".
-    """
-
-    @model_validator(mode="before")
-    @classmethod
-    def _from_files(cls, data: Any, info: ValidationInfo) -> Any:
-        if not isinstance(data, dict):
-            return data
-        folder, read = (info.context or {}).get("folder", Path()), dict(data)
-        for key, field in cls.model_fields.items():
-            if isinstance(data.get(key), str) and _takes_matrix(field.annotation):
-                try:
-                    read[key] = read_matrix(data[key], folder)
-                except ProblemError as error:
-                    raise MisfitError(str(error), key) from None
-        return read
-
-    def run(self, backend: Any) -> Synthesis | LmiAnswer:
-        """Return what was found by a back end (its name, or itself), certified."""
-        raise TypeError(f"{type(self).__name__} defines no run")
-
-    def arguments(self) -> dict[str, Any]:
-        """Return what is given under the keys' names, matrices as arrays; of a box its vertices."""
-        found = {key: value for key, value in self if value is not None}
-        found = {key: np.array(value) if _is_matrix(value) else value for key, value in found.items()}
-        if "half_widths" in found:
-            half = np.array(found.pop("half_widths"))
-            found["vertices"] = synthesis.box_vertices(-half, half)
-        return found
-
-
-def _takes_matrix(annotation: Any) -> bool:
-    """Return whether a field holds a matrix and no text: a list of lists of numbers, or None."""
-    if get_origin(annotation) in (Union, UnionType, Annotated):
-        return any(map(_takes_matrix, get_args(annotation)))
-    return get_origin(annotation) is list and _is_row(get_args(annotation)[0])
-
-
-def _is_row(annotation: Any) -> bool:
-    inner = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
-    return get_origin(inner) is list
-
-
-def _is_matrix(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and isinstance(value[0], list)
-
-
-HalfWidths = Annotated[
-    Annotated[list[NonNegative], Field(min_length=1, max_length=12)] | None,
-    Field(description="of a box of starts of the state about zero, instead of vertices"),
-]
-
-
-def _one_of_starts(part: Any) -> Any:
-    if part.vertices is not None and part.half_widths is not None:
-        raise ValueError("give either vertices or half_widths, not both")
-    return part
-
-
-Fastest = Annotated[Positive | None, Field(description="largest distance of a pole from zero")]
-Decay = Annotated[NonNegative | None, Field(description="every pole's real part is below minus this number")]
-Damping = Annotated[
-    Annotated[float, Field(gt=0.0, lt=1.0)] | None, Field(description="every pole's damping ratio is above this number")
-]
-Disc = Annotated[
-    Annotated[list[float], Field(min_length=2, max_length=2)] | None,
-    Field(description="centre, on the real axis, and radius of a disc that holds every pole [rad/s]"),
-]
-
-
-class StateFeedback(Recipe):
+class StateFeedback(OfPlant):
     """u = -K x with the smallest H-infinity norm from w to z = C x + D u + F w."""
 
-    A: Table
-    B: Table
-    E: Table
+    E: Table | None = Field(default=None, description="of the disturbance; B if left out")
     C: Table
     D: Table
     F: Table | None = None
@@ -118,19 +48,18 @@ class StateFeedback(Recipe):
 
     @model_validator(mode="after")
     def _starts(self) -> StateFeedback:
-        return _one_of_starts(self)
+        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
-        return synthesis.state_feedback(**self.arguments(), backend=backend)
+        given = self.arguments()
+        return synthesis.state_feedback(**{"E": given["B"], **given}, backend=backend)
 
 
-class MixedStateFeedback(Recipe):
+class MixedStateFeedback(OfPlant):
     """u = -K x with the smallest H2 norm from w2 to z2 = C2 x + D2 u that keeps the H-infinity norm from w to z."""
 
-    A: Table
-    B: Table
-    E: Table
+    E: Table | None = Field(default=None, description="of the disturbance; B if left out")
     C: Table
     D: Table
     F: Table | None = None
@@ -149,11 +78,12 @@ class MixedStateFeedback(Recipe):
 
     @model_validator(mode="after")
     def _starts(self) -> MixedStateFeedback:
-        return _one_of_starts(self)
+        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
-        return synthesis.mixed_state_feedback(**self.arguments(), backend=backend)
+        given = self.arguments()
+        return synthesis.mixed_state_feedback(**{"E": given["B"], **given}, backend=backend)
 
 
 class Observer(Recipe):
@@ -177,11 +107,9 @@ class Observer(Recipe):
         return synthesis.observer(**self.arguments(), backend=backend)
 
 
-class InputEllipsoid(Recipe):
+class InputEllipsoid(OfPlant):
     """u = -K x that decays as asked from a box of starts and keeps the command within a limit."""
 
-    A: Table
-    B: Table
     vertices: Table | None = Field(default=None, description="starts, one a row; or give half_widths")
     half_widths: HalfWidths = None
     limit: Positive
@@ -196,18 +124,16 @@ class InputEllipsoid(Recipe):
     def _starts(self) -> InputEllipsoid:
         if self.vertices is None and self.half_widths is None:
             raise ValueError("give vertices or half_widths: the starts from which the command is kept small")
-        return _one_of_starts(self)
+        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
         return synthesis.input_ellipsoid(**self.arguments(), backend=backend)
 
 
-class IntermediateObserver(Recipe):
+class IntermediateObserver(OfPlant):
     """K and L of the intermediate-observer pair with the smallest certified gamma."""
 
-    A: Table
-    B: Table
     C: Table | None = None
     varpi: Positive
     s: Positive = Field(default=0.3, description="where X1^2 is replaced by its tangent")
@@ -219,7 +145,7 @@ class IntermediateObserver(Recipe):
 
     @model_validator(mode="after")
     def _starts(self) -> IntermediateObserver:
-        return _one_of_starts(self)
+        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""

@@ -275,20 +275,58 @@ def test_regions_of_a_file_that_cannot_be_are_told(tmp_path, added, told):
     assert "mixed.toml" in str(raised.value)
 
 
+@pytest.fixture
+def docking(tmp_path):
+    """Return where a recipe may name docking.toml, and its lines but for the plant: z = (x, u), twice."""
+    (tmp_path / "docking.toml").write_text(read("shi2020/docking").text)
+    rows = {name: np.eye(9)[:, :6].tolist() for name in ("C", "C2")} | {
+        name: np.eye(9)[:, 6:].tolist() for name in ("D", "D2")
+    }
+    lines = [*(f"{name} = {value}" for name, value in rows.items()), "gamma = 1.5", "damping = 0.9"]
+    return tmp_path, MIXED.partition("A =")[0] + "\n".join(lines) + "\n"
+
+
 @pytest.mark.slow
-def test_gains_of_a_mixed_recipe_go_into_a_mission(tmp_path):
-    """Six states and three commands of the docking pair: K of a law that has more gains than the recipe."""
-    plant = load_synthesis("shi2020/synthesis").recipe
-    matrices = {"A": plant.A, "B": plant.B, "E": plant.B}
-    matrices |= {name: np.eye(9)[:, :6].tolist() for name in ("C", "C2")}
-    matrices |= {name: np.eye(9)[:, 6:].tolist() for name in ("D", "D2")}
-    path, mission = tmp_path / "mixed.toml", tmp_path / "docking.toml"
-    lines = [f"{name} = {rows}" for name, rows in matrices.items()]
-    head = MIXED.partition("A =")[0]
-    path.write_text(head + "\n".join([*lines, "gamma = 1.5", "damping = 0.9"]) + "\n")
-    mission.write_text(read("shi2020/docking").text)
+def test_the_plant_of_a_mission_is_designed_for_and_gets_the_gains(docking):
+    folder, text = docking
+    path, mission = folder / "mixed.toml", folder / "docking.toml"
+    path.write_text(text + 'mission = "docking.toml"\nscheme = "iobc"\n')
     case = load_synthesis(path)
+    plant = load(mission).linearised("iobc")
+    given = case.recipe.arguments()
+    np.testing.assert_array_equal(given["A"], plant.A)
+    np.testing.assert_array_equal(given["B"], plant.B)
     found = synthesize(case)
     assert found["certified"], found["sentence"]
+    K = np.array(found["gains"]["K"])
+    slowest = max(pole[0] for pole in found["poles_rad_s"])
+    assert np.linalg.eigvals(plant.A - plant.B @ K).real.max() == pytest.approx(slowest, rel=1e-9)
     target_of(mission, "iobc").write(case, found["gains"])
     assert load(mission).scheme("iobc").law.controller_gain.full().tolist() == found["gains"]["K"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("added", "told"),
+    [
+        ('mission = "docking.toml"\nA = [[1.0]]', "recipe.mission: is given beside A; the plant comes from one"),
+        (
+            'mission = "docking.toml"\nscheme = "x"',
+            "recipe.scheme: no scheme 'x' in docking; there is iobc, iobc_printed",
+        ),
+        ('mission = "nowhere.toml"', "recipe.mission: cannot be read: no problem file 'nowhere.toml'"),
+        ("A = [[1.0]]", "recipe.B: is missing beside A"),
+        (
+            'A = [[1.0]]\nB = [[1.0]]\nscheme = "x"',
+            "recipe.scheme: names one of the mission that the key mission names",
+        ),
+        ("", "recipe.A: is missing; give A and B, or mission, whose plant is then linearised"),
+    ],
+)
+def test_plants_that_are_not_given_once_are_told(docking, added, told):
+    folder, text = docking
+    path = folder / "mixed.toml"
+    path.write_text(text + added + "\n")
+    with pytest.raises(ProblemError) as raised:
+        load_synthesis(path)
+    assert told in str(raised.value)

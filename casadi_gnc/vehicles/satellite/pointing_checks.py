@@ -27,10 +27,11 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import held, loop_at, rows_of, spectral_radius
+from casadi_gnc.checking.linear import held, loop_at, spectral_radius
 from casadi_gnc.checks import Check
 from casadi_gnc.mechanics import earth, quaternions
 from casadi_gnc.mechanics.orbits import Orbit
+from casadi_gnc.missions.linear_plant import rows_of
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.navigation import Mekf
