@@ -25,9 +25,10 @@ RUNS = 5
 
 
 def mission() -> casadi_gnc.Mission:
-    """Return the shipped slew, flown by the law that Basilisk has too."""
-    friction = {f"wheel.{i}.coulomb_N_m": COULOMB for i in (1, 2, 3, 4)}
-    slew = casadi_gnc.load("satellites/slew", friction).with_timing(duration=DURATION)
+    """Return the shipped slew from rest, flown by the law that Basilisk has too."""
+    told: dict[str, Any] = {f"wheel.{i}.coulomb_N_m": COULOMB for i in (1, 2, 3, 4)}
+    told["initial.rate_rad_per_s"] = [0.0, 0.0, 0.0]
+    slew = casadi_gnc.load("satellites/slew", told).with_timing(duration=DURATION)
     return slew.with_scheme("pd", law=MrpFeedback(body=slew.craft.belief(), **GAINS))
 
 
@@ -45,8 +46,8 @@ def here(flown: casadi_gnc.Mission) -> float:
     return min(spent)
 
 
-def there(flown: casadi_gnc.Mission) -> float:
-    """Return the processor time of a flight in Basilisk, [s]."""
+def in_basilisk(flown: casadi_gnc.Mission, *, recorded: bool = True) -> Any:
+    """Return the same flight as a simulation of Basilisk, ready to run; it has `craft` and `recorders`."""
     from Basilisk.architecture import messaging
     from Basilisk.fswAlgorithms import attTrackingError, inertial3D, mrpFeedback, rwMotorTorque
     from Basilisk.simulation import reactionWheelStateEffector, simpleNav, spacecraft
@@ -54,7 +55,8 @@ def there(flown: casadi_gnc.Mission) -> float:
 
     known: Any = flown.craft
     start, column = known.start(), lambda values: [[float(value)] for value in values]
-    simulation, craft = SimulationBaseClass.SimBaseClass(), spacecraft.Spacecraft()
+    simulation: Any = SimulationBaseClass.SimBaseClass()
+    craft = spacecraft.Spacecraft()
     period = macros.sec2nano(flown.timing.sample_period)
     simulation.CreateNewProcess("process").addTask(simulation.CreateNewTask("task", period))
     craft.hub.mHub, craft.hub.IHubPntBc_B, craft.hub.r_BcB_B = known.mass_kg, known.inertia_kg_m2, column([0.0] * 3)
@@ -86,15 +88,24 @@ def there(flown: casadi_gnc.Mission) -> float:
         listener.subscribeTo(message)
     for priority, module in enumerate((craft, wheels, sharing, law, error, wanted, seen), 10):
         simulation.AddModelToTask("task", module, priority)
-    recorders = [each.recorder() for each in (craft.scStateOutMsg, wheels.rwSpeedOutMsg, sharing.rwMotorTorqueOutMsg)]
+    messages = (craft.scStateOutMsg, wheels.rwSpeedOutMsg, sharing.rwMotorTorqueOutMsg) if recorded else ()
+    recorders = [each.recorder() for each in messages]
     for recorder in recorders:
         simulation.AddModelToTask("task", recorder)
     simulation.InitializeSimulation()
-    simulation.ConfigureStopTime(macros.sec2nano(DURATION))
+    simulation.ConfigureStopTime(macros.sec2nano(flown.timing.duration))
+    simulation.craft, simulation.recorders = craft, recorders
+    simulation.others = (factory, wheels, sharing, law, error, wanted, seen, rows, body)  # Basilisk keeps none of them
+    return simulation
+
+
+def there(flown: casadi_gnc.Mission) -> float:
+    """Return the processor time of a flight in Basilisk, [s]."""
+    simulation = in_basilisk(flown)
     begun = time.process_time()
     simulation.ExecuteSimulation()
     spent = time.process_time() - begun
-    final = np.array(recorders[0].sigma_BN)[-1]
+    final = np.array(simulation.recorders[0].sigma_BN)[-1]
     assert np.abs(final).max() < 1e-4, final  # it has turned there
     return spent
 
