@@ -16,6 +16,11 @@ t           width of the pulse, [s]
 c stays within half of F_max max(d, q), the least bit, so that at every sample what was delivered is within half a least
 bit of what was asked, however long the flight: the first difference of the error is what a sigma-delta modulator
 shapes. Without carrying over, c is always zero: plain modulation of the width.
+
+**Valves** that must not be open together, and a largest number of open ones: of the pulses that are due, the one with
+the largest wanted impulse is made, those that it forbids are not, then the next one, until as many are open as may be.
+What a valve is not allowed stays in its c, so that its turn comes; c is at most F_max h there, one sample's worth, and
+what is asked beyond that is lost.
 """
 
 from __future__ import annotations
@@ -26,6 +31,7 @@ from typing import Any
 
 import casadi as ca
 
+from casadi_gnc.errors import AllocationError
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.exact import is_zero
 from casadi_gnc.signals import Layout, Signal
@@ -57,6 +63,47 @@ class Pulse:
         return bounds.clip(width, 0.0, period)
 
 
+@dataclass(frozen=True)
+class Valves:
+    """Say which valves may be open together.
+
+    Parameters
+    ----------
+    never_together : pairs of actuators, counted from 0.
+    open_at_most : how many; any number if left out.
+    """
+
+    never_together: tuple[tuple[int, int], ...] = ()
+    open_at_most: int | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.never_together) or self.open_at_most is not None
+
+    def check(self, count: int) -> None:
+        """Raise `AllocationError` where the rules are none for so many actuators."""
+        for pair in self.never_together:
+            if len(set(pair)) != 2 or not all(0 <= i < count for i in pair):
+                told = " and ".join(str(i + 1) for i in pair)
+                raise AllocationError(f"valves {told} never together: expected two different ones of 1 to {count}")
+        if self.open_at_most is not None and self.open_at_most < 1:
+            raise AllocationError(f"at most {self.open_at_most} valves open, expected 1 or more")
+
+    def admitted(self, due: Sequence[Any], wanted: Sequence[Any]) -> list[Any]:
+        """Return which of the pulses that are due may be made, flags, the largest wanted impulse first."""
+        waiting, opened = list(due), [ca.SX(0) for _ in due]
+        partners = [[sum(pair) - i for pair in self.never_together if i in pair] for i in range(len(waiting))]
+        for _ in range(len(waiting) if self.open_at_most is None else min(self.open_at_most, len(waiting))):
+            best, none = ca.SX(-1), ca.SX(1)
+            for flag, impulse in zip(waiting, wanted, strict=True):
+                best = bounds.maximum(best, ca.if_else(flag, impulse, -1))
+            for i, impulse in enumerate(wanted):
+                chosen = ca.logic_and(ca.logic_and(waiting[i], impulse >= best), none)
+                none, opened[i] = ca.logic_and(none, ca.logic_not(chosen)), ca.logic_or(opened[i], chosen)
+                for j in (i, *partners[i]):
+                    waiting[j] = ca.logic_and(waiting[j], ca.logic_not(chosen))
+        return opened
+
+
 @dataclass(frozen=True, eq=False)
 class PulseModulation:
     """Make pulses for some of the actuators; the others are told what is asked.
@@ -65,10 +112,12 @@ class PulseModulation:
     ----------
     pulses : of each actuator; None for one that makes what it is told.
     most : F_max of each, [N].
+    valves : which of the actuators that make pulses may be open together.
     """
 
     pulses: Sequence[Pulse | None]
     most: Sequence[Any]
+    valves: Valves = Valves()
 
     @property
     def memory(self) -> Layout:
@@ -77,13 +126,25 @@ class PulseModulation:
 
     def __call__(self, asked: Any, carried: Any, period: float) -> tuple[Any, Any]:
         """Return what the actuators are told, (N,), and c', for what is asked of them, (N,)."""
-        told, left = [], []
-        for i, (pulse, most) in enumerate(zip(self.pulses, self.most, strict=True)):
-            if pulse is None:
-                told.append(asked[i])
-                continue
-            wanted = asked[i] * period + carried.impulse_carry[len(left)]
-            width = pulse.width(wanted / most, period)
-            told.append(most * width / period)
-            left.append(wanted - most * width if pulse.carries else ca.SX(0))
+        told: list[Any] = [asked[i] for i in range(len(self.pulses))]
+        both = enumerate(zip(self.pulses, self.most, strict=True))
+        made = [(i, pulse, most) for i, (pulse, most) in both if pulse is not None]
+        wanted = [asked[i] * period + carried.impulse_carry[place] for place, (i, _, _) in enumerate(made)]
+        widths = [pulse.width(each / most, period) for each, (_, pulse, most) in zip(wanted, made, strict=True)]
+        if self.valves:
+            widths = self._allowed(widths, wanted, [i for i, _, _ in made])
+        left = []
+        for (i, pulse, most), width, each in zip(made, widths, wanted, strict=True):
+            told[i] = most * width / period
+            rest = each - most * width
+            if self.valves:
+                rest = bounds.clip(rest, -most * period, most * period)
+            left.append(rest if pulse.carries else ca.SX(0))
         return ca.vertcat(*told), ca.vertcat(*left)
+
+    def _allowed(self, widths: list[Any], wanted: list[Any], places: list[int]) -> list[Any]:
+        """Return the widths, zero where the valves' rules say so."""
+        pairs = tuple((places.index(i), places.index(j)) for i, j in self.valves.never_together)
+        rules = Valves(pairs, self.valves.open_at_most)
+        opened = rules.admitted([width > 0 for width in widths], wanted)
+        return [ca.if_else(flag, width, 0.0) for flag, width in zip(opened, widths, strict=True)]

@@ -9,9 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 import casadi_gnc
-from casadi_gnc.allocation.pulses import Pulse, PulseModulation
+from casadi_gnc.allocation.pulses import Pulse, PulseModulation, Valves
 from casadi_gnc.campaigns.engines import CompiledBatch, best_vectors
-from casadi_gnc.errors import FlightError
+from casadi_gnc.errors import FlightError, ProblemError
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.mechanics.firing import STANDARD_GRAVITY, FiringThrusters
 from casadi_gnc.missions.parameters import vary
@@ -64,6 +64,56 @@ def test_width_alone_carries_nothing_over():
     told, left = modulation(ca.DM([0.049]), SimpleNamespace(impulse_carry=ca.DM([0.0])), PERIOD)
     assert float(ca.DM(told)) == 0.0  # 9.8 ms of 20 ms at least
     assert float(ca.DM(left)) == 0.0
+
+
+@pytest.mark.parametrize(
+    "valves", [Valves(((1, 2),)), Valves((), 2), Valves(((1, 2), (2, 4)), 2)], ids=["a pair", "two open", "both"]
+)
+def test_valves_wait_for_their_turn(valves):
+    """Sample by sample against the same choice in Python; the impulse is all there, delivered or carried."""
+    pulse, most, asked = Pulse(0.02, 0.005), 2.0, ca.SX.sym("asked", 5)
+    modulation, carried = PulseModulation((None, *[pulse] * 4), [9.0] + [most] * 4, valves), ca.SX.sym("carried", 4)
+    step = ca.Function("step", [asked, carried], modulation(asked, modulation.memory.split(carried), PERIOD))
+    generator, left = np.random.default_rng(4), np.zeros(4)
+    for each in generator.uniform(0, 0.25, (200, 5)) * most:
+        wanted = each[1:] * PERIOD + left
+        told, after = (np.array(part).ravel() for part in step(each, left))
+        due = [i for i in np.argsort(-wanted, kind="stable") if wanted[i] / most >= 0.5 * pulse.least_on]
+        opened: list[int] = []
+        for i in due:
+            forbidden = any({i + 1, j + 1} in ({*pair} for pair in valves.never_together) for j in opened)
+            if not forbidden and len(opened) < (valves.open_at_most or 4):
+                opened.append(int(i))
+        assert sorted(opened) == np.flatnonzero(told[1:]).tolist()
+        assert told[0] == each[0]
+        assert np.abs(wanted - told[1:] * PERIOD - after).max() < 1e-12
+        assert np.abs(after[opened]).max(initial=0.0) <= 0.5 * pulse.least_on * most + 1e-12
+        left = after
+    assert np.abs(left).max() <= most * PERIOD
+
+
+def test_what_is_asked_beyond_all_turns_is_lost():
+    """Two that exclude each other, both asked for all: c stops at one sample's worth."""
+    modulation = PulseModulation([Pulse(), Pulse()], [1.0, 1.0], Valves(((0, 1),)))
+    left = np.zeros(2)
+    for _ in range(50):
+        told, after = modulation(ca.DM([1.0, 1.0]), modulation.memory.split(ca.DM(left)), PERIOD)
+        left = np.array(ca.DM(after)).ravel()
+        assert sorted(np.array(ca.DM(told)).ravel()) == [0.0, 1.0]
+    assert left.max() == pytest.approx(PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("valves", "told"),
+    [
+        ({"never_together": [[1, 1]]}, "thruster 1 is paired with itself"),
+        ({"never_together": [[1, 9]]}, "thruster 9 is not one of 8"),
+        ({"open_at_most": 0}, "is 0, expected a number >= 1"),
+    ],
+)
+def test_bad_valves(valves, told):
+    with pytest.raises(ProblemError, match=told):
+        casadi_gnc.load(PULSES, changes={"valves": valves})
 
 
 def test_open_time_of_each_step_is_exact_also_over_the_end_of_a_sample():
@@ -129,6 +179,27 @@ def test_a_thousand_seconds_of_pulses():
     controller = mission.controller()
     for t, mrp, rate, pulses in zip(flight.time[:300], flight["mrp"], flight["rate"], told, strict=False):
         assert np.array_equal(controller.step(t, mrp=mrp, rate=rate)["force"], pulses)
+
+
+@pytest.mark.slow
+def test_a_flight_keeps_the_rules_of_its_valves():
+    """At every sample, and on board in the same words; the attitude is held with three valves at most."""
+    valves = {"never_together": [[1, 2], [5, 6]], "open_at_most": 3}
+    mission = casadi_gnc.load(PULSES, changes={**PINV, "valves": valves, "timing.duration_s": 100.0})
+    flight = casadi_gnc.fly(mission, decimation=1)
+    opened = flight["force"] > 0
+    assert opened.sum(axis=1).max() == 3
+    for first, second in valves["never_together"]:
+        assert not np.any(opened[:, first - 1] & opened[:, second - 1])
+        assert opened[:, first - 1].any()
+        assert opened[:, second - 1].any()
+    assert flight["pointing_error_deg"][-50:].max() < 0.2
+    controller = mission.controller()
+    for t, mrp, rate, pulses in zip(flight.time[:300], flight["mrp"], flight["rate"], flight["force"], strict=False):
+        assert np.array_equal(controller.step(t, mrp=mrp, rate=rate)["force"], pulses)
+    craft: Any = mission.craft
+    said = pointing_checks.checks(craft, mission, mission.scheme())
+    assert "authority.pulse_limit_cycle" not in [check.name for check in said]  # nothing is promised of those that wait
 
 
 @pytest.mark.slow

@@ -58,7 +58,7 @@ def actuators(craft: SatelliteCraft, centre: Any) -> Actuators:
         upper=upper,
         reach=None if limits is None else limits.reach,
         judge=None if limits is None else limits.judge,
-        modulation=part_tables.modulation(len(craft.wheel), craft.thruster, len(craft.magnetorquer)),
+        modulation=part_tables.modulation(len(craft.wheel), craft.thruster, len(craft.magnetorquer), craft.valves),
     )
 
 

@@ -42,7 +42,15 @@ from . import actuating, part_tables
 from .attitude_tables import InitialAttitude
 from .estimator_tables import AnyEstimator
 from .orbit_tables import Environment, FieldTable, OrbitTable
-from .part_tables import FlexibleModeTable, MagnetorquerTable, MomentumTable, SloshTable, ThrusterTable, WheelTable
+from .part_tables import (
+    FlexibleModeTable,
+    MagnetorquerTable,
+    MomentumTable,
+    SloshTable,
+    ThrusterTable,
+    ValveTable,
+    WheelTable,
+)
 from .plant import Satellite
 from .plate_tables import AirTable, PlateTable
 from .reference_tables import AnyReference, InertialTable, timeline
@@ -74,6 +82,7 @@ class SatelliteCraft(Craft):
     rate_limit_rad_per_s: Positive = Field(default=10.0, description="larger measured rates per axis are rejected")
     wheel: list[WheelTable] = table([], "a reaction wheel; there may be several")
     thruster: list[ThrusterTable] = table([], "a thruster; there may be several")
+    valves: ValveTable | None = table(None)
     magnetorquer: list[MagnetorquerTable] = table([], "a coil; there may be several")
     flexible_mode: list[FlexibleModeTable] = table([], "a bending mode; there may be several")
     slosh: list[SloshTable] = table([], "a mass of liquid; there may be several")
@@ -100,6 +109,8 @@ class SatelliteCraft(Craft):
         if self.field is not None:
             self._field()
         self._turning()
+        if self.valves is not None:
+            self.valves.check(self.thruster)
         if (self.plate or self.air is not None) and self.orbit is None:
             raise MisfitError("air and sunlight need to know where the satellite is; give [orbit]", "plate")
         if self.air is not None and not self.plate:

@@ -61,7 +61,8 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[
     if limit is None:
         return
     still, own = held(mission, scheme)
-    if scheme.actuation.modulation is not None and still.target:
+    # Where valves wait for their turn, impulses are not within half a least bit: nothing is promised.
+    if scheme.actuation.modulation is not None and craft.valves is None and still.target:
         turned = limit_cycle(craft, still, own)
         if turned is not None:
             yield Check(

@@ -1,0 +1,79 @@
+"""Measure the pulses that are made on board beside the best ones of each sample, on samples of flights.
+
+    python tests/bench/pulse_rounding.py [--samples 100] [--method robust]
+
+Instances are the samples of satellites/thruster_pulses, as shipped and with rules for its valves: what each thruster is
+asked for with what it carries over, and the pulses that the flight made of it. The best pulses keep the same rules and
+miss the wanted effort impulse by no more than the flown ones, with least propellant (mixed-integer programs).
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+import casadi_gnc
+from casadi_gnc.allocation import AllocationProblem
+from casadi_gnc.allocation.pulse_optimum import PulseRules, best_pulses
+from casadi_gnc.allocation.pulses import Pulse, Valves
+
+MISSION = "satellites/thruster_pulses"
+PERIOD, LEAST, QUANTUM = 0.2, 0.02, 0.005
+VALVES = {
+    "no rules": None,
+    "two pairs": {"never_together": [[1, 2], [5, 6]]},
+    "two pairs, three open": {"never_together": [[1, 2], [5, 6]], "open_at_most": 3},
+}
+
+
+def measured(valves: dict[str, Any] | None, samples: int, method: str) -> dict[str, float]:
+    """Return propellant of flown and best pulses, and errors of effort impulse, over samples of a flight."""
+    changes: dict[str, Any] = {"timing.duration_s": samples * PERIOD, "scheme.1.allocation": {"method": method}}
+    if valves:
+        changes["valves"] = valves
+    mission = casadi_gnc.load(MISSION, changes=changes)
+    flight = casadi_gnc.fly(mission, decimation=1)
+    made: Any = mission.scheme().actuation.effectiveness
+    problem = AllocationProblem(np.array(made), 0.0, 1.0)
+    pairs = tuple((i - 1, j - 1) for i, j in (valves or {}).get("never_together", []))
+    rules = PulseRules(
+        [Pulse(LEAST, QUANTUM)] * problem.count, PERIOD, Valves(pairs, (valves or {}).get("open_at_most"))
+    )
+    told, carry = flight["force"][:samples], flight["impulse_carry"][:samples]
+    flown, best, errors, least, worst = 0.0, 0.0, [], [], 0.0
+    for pulses, left in zip(told, carry, strict=True):
+        widths, wanted = pulses * PERIOD, problem.effectiveness @ (pulses * PERIOD + left)
+        assert not rules.broken(widths)
+        error = float(np.abs(wanted - problem.effectiveness @ widths).sum())
+        found = best_pulses(problem, wanted, rules, error=error)
+        assert not rules.broken(found.widths)
+        flown, best = flown + float(widths.sum()), best + found.propellant
+        errors.append(error)
+        least.append(best_pulses(problem, wanted, rules).error)
+        worst = max(worst, float(np.abs(left).max()))
+    return {
+        "instances": len(told),
+        "flown_N_s": flown,
+        "best_N_s": best,
+        "ratio": flown / best if best > 0 else np.nan,
+        "error_flown_N_m_s": float(np.mean(errors)),
+        "error_least_N_m_s": float(np.mean(least)),
+        "largest_carry_N_s": worst,
+    }
+
+
+def main() -> None:
+    """Print a line for each set of rules and each allocation before the pulses."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=100, help="of each flight, one with each set of rules")
+    parser.add_argument("--method", default="robust", help="allocation before the pulses: robust, pinv")
+    given = parser.parse_args()
+    for name, valves in VALVES.items():
+        found = measured(valves, given.samples, given.method)
+        print(f"{name}: " + ", ".join(f"{key} {value:.4g}" for key, value in found.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main()
