@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import casadi as ca
 
@@ -20,8 +20,14 @@ MISUSE = {
         "TIME_SHIFTED",
         "The time did not advance by the period; the memory was advanced by one period all the same.",
     ),
+    1 << 26: ("STATE_DAMAGED", "The state was changed between two steps, as its checksum shows; the outputs are zero."),
     1 << 28: ("NOT_INITIALISED", "Parameters or state were not initialised, or are damaged; the outputs are zero."),
 }
+#: The bit beside them of packages with parameters, where their defaults are not to fly.
+NOT_CONFIGURED = (
+    "NOT_CONFIGURED",
+    "The parameters are defaults, and this build asks for others; the outputs are zero.",
+)
 
 
 @dataclass(frozen=True)
@@ -99,6 +105,7 @@ class Controller:
     statuses : bit -> (name, sentence), those that a controller can raise.
     carry : how many numbers of the memory, the last ones, pulses carry over.
     monitor : what the package watches on board, or None.
+    notes : tape -> result -> what its elements are, for those who read the C: how many, what.
     """
 
     title: str
@@ -121,6 +128,7 @@ class Controller:
     allocation: AllocationProblem | None = None
     monitor: Monitor | None = None
     carry: int = 0
+    notes: dict[str, dict[str, tuple[tuple[int, str], ...]]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for layout in (self.measured, self.memory, self.outputs):
@@ -137,7 +145,8 @@ class Controller:
     @property
     def raised(self) -> dict[int, tuple[str, str]]:
         """Every bit of the status, as `statuses`: those of the controller, and those of misuse."""
-        return {**self.statuses, **MISUSE}
+        unread = {1 << 25: NOT_CONFIGURED} if self.tunables else {}
+        return {**self.statuses, **unread, **MISUSE}
 
     @property
     def outputs(self) -> Layout:

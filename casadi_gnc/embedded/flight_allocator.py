@@ -25,6 +25,7 @@ STATUSES = {
     2: ("COMMAND_REFUSED", "the command is not finite or too large: the forces are the last ones, the rest is zero"),
     4: ("HEALTH_REFUSED", "a health is unknown, or the force of a stuck actuator is not finite: it counts as dead"),
     8: ("NOT_INITIALISED", "parameters or state were not initialised, or are damaged: the forces are zero"),
+    16: ("STATE_DAMAGED", "the state was changed between two steps, as its checksum shows: the forces are zero"),
 }
 #: Largest magnitude of a command: the squares of larger ones are no numbers, as in `casadi_gnc.allocation.allocator`.
 MOST = {"double": LARGEST, "float": 1e15}

@@ -23,6 +23,7 @@ STATUSES = {
     2: ("RESULT_REFUSED", "a result is not finite: outputs and state are those of the last good step"),
     4: ("SINGULAR", "a linear system has no solution: outputs and state are those of the last good step"),
     8: ("NOT_INITIALISED", "the state was not initialised, or is damaged: outputs are zero"),
+    16: ("STATE_DAMAGED", "the state was changed between two steps, as its checksum shows: outputs are zero"),
 }
 #: What may be said of a port.
 _SAID = ("unit", "note", "initial")

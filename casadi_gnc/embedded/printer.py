@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from textwrap import wrap
 from typing import Literal
 
 import casadi as ca
 
-from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Real, c_constant, expression, graph, uses
+from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Node, Real, c_constant, expression, graph, uses
 from casadi_gnc.errors import PrinterError
 
 
@@ -29,6 +30,7 @@ def print_function(
     places: Mapping[str, Sequence[str]] | None = None,
     flag: str = "_Bool",
     shared: Sequence[str] | None = None,
+    titles: Mapping[str, str] | None = None,
 ) -> str:
     """Return the C text of a `static` function with the name of `function`.
 
@@ -43,6 +45,7 @@ def print_function(
     flag : C type of conditions.
     shared : print the function for LANES columns side by side, element i of lane l at `name[i * LANES + l]`, but of
         these ports one column for all.
+    titles : for places of results what they are: the operations that each is the first to need follow it as a comment.
 
     Raises
     ------
@@ -62,10 +65,17 @@ def print_function(
     nodes, results = graph(function, places)
     zero, one = c_constant(0.0, real), c_constant(1.0, real)
     used, compared = uses(nodes, [node for _, node in results])
-    body = []
+    blocks = _blocks(nodes, results, titles or {})
+    body, block, told = [], "", set()
     for k, node in enumerate(nodes):
         if k not in used:
             continue
+        if blocks.get(k, block) != block:
+            block = blocks[k]
+            lines = wrap(block if block not in told else f"{block.partition(':')[0]} again", 112)
+            body += [f"    /* {line}" if i == 0 else f"     * {line}" for i, line in enumerate(lines)]
+            body[-1] += " */"
+            told.add(block)
         if node.code == ca.OP_CONST:
             # A bound beyond the largest float is met by every finite float and by no infinite one.
             huge = real == "float" and k in compared and math.isfinite(node.number)
@@ -83,7 +93,8 @@ def print_function(
             if shared is not None and node.is_flag:
                 text = _as_number(node.code, text, flags, real)
             text = text.format(*(f"a{i}" for i in node.operands))
-        body.append(f"    const {flag if node.is_flag and shared is None else 'gnc_real'} a{k} = {text};")
+        dust = _dust(node.number) if titles is not None and node.code == ca.OP_CONST else ""
+        body.append(f"    const {flag if node.is_flag and shared is None else 'gnc_real'} a{k} = {text};{dust}")
     as_number = f" ? {one} : {zero}"
     stores = [f"    {place} = a{k}{as_number if nodes[k].is_flag and shared is None else ''};" for place, k in results]
     unused = []
@@ -98,6 +109,27 @@ def print_function(
     loop = ["    long l;", "#pragma omp simd", "    for (l = 0; l < LANES; l++) {"]
     inner = [f"    {line}" for line in (*body, *stores)]
     return "\n".join([head, loop[0], *unused, *loop[1:], *inner, "    }", "}", ""])
+
+
+def _blocks(nodes: list[Node], results: list[tuple[str, int]], titles: Mapping[str, str]) -> dict[int, str]:
+    """Return for each scalar the title of the first result that needs it."""
+    found: dict[int, str] = {}
+    for place, node in results:
+        todo = [node] if place in titles else []
+        while todo:
+            k = todo.pop()
+            if k not in found:
+                found[k] = titles[place]
+                todo += nodes[k].operands
+    return found
+
+
+def _dust(number: float) -> str:
+    """Return a comment on a constant that arithmetic left next to a short number, or next to zero; "" for others."""
+    short = float(f"{number:.9g}")
+    if number != short and abs(number - short) <= 8.0 * math.ulp(short):
+        return f" /* {short!r} and rounding */"
+    return " /* rounding of zero, where other numbers are about 1 */" if 0.0 < abs(number) < 2.0**-52 else ""
 
 
 def _as_number(code: int, text: str, flags: list[bool], real: Real) -> str:

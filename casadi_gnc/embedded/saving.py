@@ -35,6 +35,7 @@ def to_text(controller: Controller) -> str:
     content["tapes"] = {name: tape.serialize() for name, tape in controller.tapes.items()}
     content["statuses"] = [[bit, name, sentence] for bit, (name, sentence) in controller.statuses.items()]
     content["tunables"] = [asdict(one) for one in controller.tunables]
+    content["notes"] = controller.notes
     if controller.monitor is not None:
         own = controller.monitor
         kept = {"watched": [asdict(one) for one in own.watched], "tape": own.tape.serialize(), "horizon": own.horizon}
@@ -56,6 +57,10 @@ def from_text(text: str) -> Controller:
         given["tapes"] = {name: ca.Function.deserialize(tape) for name, tape in content["tapes"].items()}
         given["statuses"] = {bit: (name, sentence) for bit, name, sentence in content["statuses"]}
         given["tunables"] = tuple(Tunable(**{**one, "default": tuple(one["default"])}) for one in content["tunables"])
+        given["notes"] = {
+            tape: {port: tuple((int(n), str(what)) for n, what in blocks) for port, blocks in ports.items()}
+            for tape, ports in content.get("notes", {}).items()
+        }
         given["monitor"] = _monitor_of(content["monitor"]) if "monitor" in content else None
         given["allocation"] = None if content["allocation"] is None else _problem_of(content["allocation"])
     except (ValueError, KeyError, TypeError, RuntimeError) as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import accumulate
 from typing import Any
 
 from casadi_gnc.allocation import online
@@ -18,6 +19,7 @@ from casadi_gnc.embedded.members import (
 from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.system import assets
 from casadi_gnc.system.templates import template
+from casadi_gnc.system.text import c_comment
 
 #: Objects that a tape may read or write, with their C declarations ({name}: prefix of the package).
 _OBJECTS = {
@@ -204,6 +206,13 @@ def _print(name: str, controller: Controller, options: Options) -> tuple[str, st
     tape = controller.tapes[name]
     places = _places(name, controller)
     arguments: dict[str, Any] = {"maths": options.maths, "real": options.real, "places": places, "flag": "gnc_flag"}
+    arguments["titles"] = {
+        places[port][first + i]: f"{c_comment(what)}"
+        for port, blocks in controller.notes.get(name, {}).items()
+        for first, (count, what) in zip(accumulate((n for n, _ in blocks), initial=0), blocks, strict=False)
+        for i in range(count)
+        if first + i < len(places[port])
+    }
     draft = print_function(tape, arguments=[], **arguments)
     touched = [thing for thing in _OBJECTS if re.search(rf"\b{thing}->", draft)]
     declared = [_OBJECTS[thing].format(name=options.name) for thing in touched]

@@ -22,6 +22,7 @@ from casadi_gnc.laws import gains_of
 from casadi_gnc.missions import tapes
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.onboard_monitor import monitor_of
+from casadi_gnc.missions.onboard_notes import notes
 from casadi_gnc.missions.scheme import Scheme
 
 if TYPE_CHECKING:
@@ -83,6 +84,7 @@ def describe(
         statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in Loop(mission, chosen).raised()},
         tunables=tuple(parameters),
         allocation=allocator.problem if isinstance(allocator, OnlineInFlight) else None,
+        notes=notes(Loop(mission, chosen)),
         monitor=monitor_of(mission, Loop(mission, chosen), ca.vertcat(*symbols)) if monitored else None,
     )
 

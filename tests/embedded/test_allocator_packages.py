@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from packages import C99, STRICT, needs_target, run, units
+from packages import C99, STRICT, made_in_surroundings, needs_target, run, units
 
 import casadi_gnc as gnc
 from casadi_gnc.allocation import AllocationStatus, Allocator
@@ -91,6 +91,14 @@ def test_the_package_builds_strictly_and_is_sound(package, tmp_path):
     assert found["comparisons"][-1]["words"] == 0
 
 
+@pytest.mark.slow
+def test_a_package_does_not_depend_on_the_surroundings(tmp_path):
+    script = f"import sys, casadi_gnc; casadi_gnc.generate({str(written(tmp_path))!r}, sys.argv[1])"
+    first, second = made_in_surroundings(script, tmp_path)
+    assert first == second
+    assert len(first) > 10
+
+
 CHANGED = r"""
 #include "eight.h"
 #include <math.h>
@@ -119,6 +127,8 @@ int main(void)
     wrong |= (other.force[0] != 0.0 || other.status != 0) << 7;
     input.health[1] = 7;
     if ((eight_step(&state, &params, &input, &other) & EIGHT_HEALTH_REFUSED) == 0 || other.force[1] != 0.0) return 99;
+    state.work.command[0] = -state.work.command[0] - 1.0;
+    if (eight_step(&state, &params, &input, &other) != EIGHT_STATE_DAMAGED || other.force[1] != 0.0) return 97;
     params.upper[0] = nan("");
     if (eight_configure(&params) != 1 || eight_step(&state, 0, &input, &other) != EIGHT_NOT_INITIALISED) return 98;
     (void)before;
@@ -129,7 +139,17 @@ int main(void)
 
 def test_changed_data_are_taken_or_refused_as_a_whole_and_misuse_is_told(package, tmp_path):
     (tmp_path / "changed.c").write_text(CHANGED)
-    done = run("gcc", *C99, f"-I{package}", tmp_path / "changed.c", *units(package), "-lm", "-o", tmp_path / "changed")
+    done = run(
+        "gcc",
+        *C99,
+        "-DEIGHT_CHECK_STATE=1",
+        f"-I{package}",
+        tmp_path / "changed.c",
+        *units(package),
+        "-lm",
+        "-o",
+        tmp_path / "changed",
+    )
     assert done.returncode == 0, done.stderr
     assert run(tmp_path / "changed").returncode == 0
 

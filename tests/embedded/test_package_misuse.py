@@ -39,6 +39,28 @@ static unsigned long nonzero(void)
     return count;
 }
 
+#if SLEW_CHECK_STATE
+/* Bits of the state that can be changed between two steps without being told. */
+static unsigned long missed(void)
+{
+    unsigned long count = 0;
+    const slew_state kept = state;
+    uint32_t k, bit, word, status = 0;
+    for (k = 0; k < sizeof state; k += 4u) {
+        for (bit = 1u; bit != 0u; bit <<= 1) {
+            memcpy(&word, (char *)&state + k, 4);
+            word ^= bit;
+            memcpy((char *)&state + k, &word, 4);
+            status = slew_step(&state, &params, &in, &out);
+            count += status != (uint32_t)(state.ready == kept.ready ? SLEW_STATE_DAMAGED : SLEW_NOT_INITIALISED);
+            count += nonzero();
+            state = kept;
+        }
+    }
+    return count;
+}
+#endif
+
 int main(void)
 {
     slew_params damaged;
@@ -52,6 +74,10 @@ int main(void)
     (void)slew_configure(&params);
     SAY("configured_alone", step(0.1));
     SAY("init", slew_init(&params));
+#if SLEW_CONFIGURE_FIRST
+    SAY("defaults", step(0.1));
+    SAY("configure", slew_configure(&params));
+#endif
     memset(&state, 0, sizeof state);
     SAY("no_reset", step(0.1));
     SAY("nonzero", nonzero());
@@ -74,6 +100,10 @@ int main(void)
     damaged.configured ^= 4u;
     SAY("damaged", slew_step(&state, &damaged, &in, &out));
     SAY("told", out.status);
+#if SLEW_CHECK_STATE
+    SAY("missed", missed());
+    SAY("whole", step(0.1));
+#endif
 
     table.rate_gain = (slew_real)1.25;
     table.attitude_gain = (slew_real)2.5;
@@ -96,7 +126,7 @@ int main(void)
     return 0;
 }
 """
-SHIFTED, UNINITIALISED = 1 << 27, 1 << 28
+SHIFTED, UNINITIALISED, UNCONFIGURED = 1 << 27, 1 << 28, 1 << 25
 
 
 @pytest.mark.slow
@@ -107,12 +137,15 @@ def test_misuse_is_told(real, tmp_path):
     include = [f"-I{path}" for path in (folder, folder / "test")]
     sources = [tmp_path / "main.c", folder / "slew.c", folder / "test" / "vectors.c"]
     flags = [flag for flag in (*C99, *STRICT) if flag != "-Wdouble-promotion"]
-    done = run("gcc", *flags, *include, "-o", tmp_path / "run", *sources, "-lm")
-    assert done.returncode == 0, done.stderr[:3000]
-    lines = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True).stdout.splitlines()
-    told = [(line.split()[0], int(line.split()[1])) for line in lines]
+
+    def told(*macros: str) -> list[tuple[str, int]]:
+        done = run("gcc", *flags, *macros, *include, "-o", tmp_path / "run", *sources, "-lm")
+        assert done.returncode == 0, done.stderr[:3000]
+        lines = subprocess.run([tmp_path / "run"], capture_output=True, text=True, check=True).stdout.splitlines()
+        return [(line.split()[0], int(line.split()[1])) for line in lines]
+
     values = struct.pack(">dd" if real == "float64" else ">ff", 2.5, 1.25)
-    assert told == [
+    expected = [
         ("nothing", UNINITIALISED), ("nonzero", 0), ("no_init", UNINITIALISED), ("configured_alone", UNINITIALISED),
         ("init", 0), ("no_reset", UNINITIALISED), ("nonzero", 0), ("first", 0), ("moving", 1), ("next", 0),
         ("stands", SHIFTED), ("after", 0), ("back", SHIFTED), ("after", 0), ("jump", SHIFTED), ("late", 0),
@@ -121,3 +154,7 @@ def test_misuse_is_told(real, tmp_path):
         ("told", UNINITIALISED), ("checksum", zlib.crc32(values)), ("load", 0), ("taken", 1),
         ("corrupted", 2), ("same", 0), ("range", 1), ("same", 0), ("range", 1), ("same", 0),
     ]  # fmt: skip
+    assert told() == expected
+    asked = [*expected[:5], ("defaults", UNCONFIGURED), ("configure", 0), *expected[5:23]]
+    asked += [("missed", 0), ("whole", 0), *expected[23:]]
+    assert told("-DSLEW_CHECK_STATE=1", "-DSLEW_CONFIGURE_FIRST=1") == asked

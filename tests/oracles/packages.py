@@ -2,8 +2,10 @@
 
 import atexit
 import functools
+import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -42,6 +44,24 @@ def run(*command, folder: Path | None = None, environment: dict | None = None) -
     return subprocess.run(
         [str(word) for word in command], cwd=folder, env=environment, capture_output=True, text=True, timeout=600
     )
+
+
+#: What a package must not depend on: locale, time zone, seed of hashes, kernels of BLAS, which round otherwise.
+SURROUNDINGS = (
+    {"LC_ALL": "C", "TZ": "UTC", "PYTHONHASHSEED": "0", "OPENBLAS_CORETYPE": "Haswell"},
+    {"LC_ALL": "de_DE.UTF-8", "TZ": "Asia/Tokyo", "PYTHONHASHSEED": "1", "OPENBLAS_CORETYPE": "Prescott"},
+)
+
+
+def made_in_surroundings(script: str, folder: Path) -> tuple[dict[Path, bytes], ...]:
+    """Return the files that a script, which is told a folder as its argument, writes in each of them."""
+    found = []
+    for number, surroundings in enumerate(SURROUNDINGS):
+        place = folder / str(number)
+        done = run(sys.executable, "-c", script, place, environment={**os.environ, **surroundings})
+        assert done.returncode == 0, done.stderr
+        found.append({path.relative_to(place): path.read_bytes() for path in place.rglob("*") if path.is_file()})
+    return tuple(found)
 
 
 def needs_target(name: str) -> pytest.MarkDecorator:
