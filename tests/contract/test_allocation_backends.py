@@ -30,6 +30,8 @@ NAMES = backends.names()
 #: Without curvature of their own (M1 = M2 = 0) the gap has a part of first order in the forces: a
 #: solver's 1e-8 of the box is 1e-8 of the full effort's cost.
 DEGENERATE_FLOOR = 1e-7
+#: Back ends that take long for each problem: a second, and hundreds of iterations in Python.
+LONG = ("sdp_scs", "eiqp")
 
 
 def need(name: str) -> str:
@@ -115,7 +117,7 @@ def test_no_back_end_contradicts_the_certificate_of_another(label):
 def test_random_problems_without_uncertainty(name, rng):
     """Bounds on both sides, weights and preferred forces of every actuator's own, h over five decades."""
     relative, floor = backends.module(name).ACCURACY
-    for k in range(5 if name == "sdp_scs" else 25):
+    for k in range(5 if name in LONG else 25):
         effectiveness = rng.normal(size=(3, 4))
         problem = AllocationProblem(
             effectiveness,
@@ -171,7 +173,7 @@ def test_samples_in_a_row_are_as_accurate_as_one(name):
     problem = some_problem(name)
     allocator = Allocator(problem, name)
     relative, floor = backends.module(name).ACCURACY
-    for k in range(25):
+    for k in range(8 if name in LONG else 25):
         command = oracle.COMMAND * np.cos([0.2 * k, 0.3 * k + 1, 0.1 * k])
         case = oracle.Case(problem, command, allocator.previous)
         found = allocator.solve(command)
