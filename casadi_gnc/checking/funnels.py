@@ -163,6 +163,8 @@ def _needed_share(
     known[0] += place + h * speed
     known[1:2] -= place
     lower, upper = (np.array([wall[side] for wall in walls[1:]]).ravel() for side in (0, 1))
+    if np.isnan([lower, upper]).any():
+        return float("nan")  # widths that overflow: the program would take such a wall for none
     eye, each = sparse.identity(steps), np.ones((steps, 1))
     inside = [
         sparse.hstack([sparse.identity(steps * count), -np.kron(each, np.c_[most_above])]),
