@@ -94,7 +94,9 @@ static int factor_actuators(factors_t *fac, const data_t *data, const command_t 
     int i, k, l, e = 0;
     real packed[KT] = {0};
     for (i = 0; i < N; ++i) {
-        const real d = data->curvature[i] + it->zl[i] / it->down[i] + it->zu[i] / it->up[i];
+        /* Without weights the barrier bends enough; more would slow the last digits down to those of a gradient step. */
+        const real bend = larger(data->q[i], (real)CURVATURE_FLOOR * (real)(int)N * data->column[i] + TINY);
+        const real d = bend + it->zl[i] / it->down[i] + it->zu[i] / it->up[i];
         fac->invd[i] = command->dead[i] != 0 ? 0 : 1 / d;
         for (k = 0; k < KT; ++k) {
             packed[k] += data->SS[i][k] * fac->invd[i];
