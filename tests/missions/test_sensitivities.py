@@ -187,6 +187,7 @@ AWAY = {
     "satellites/flexible_slew": ("pd", ["initial.axis", "initial.angle_deg"]),
     "huang2019/fault_free": ("observers_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
     "huang2020/slew_as_printed": ("pd_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2020/slew_chaser_model": ("pd_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
     "satellites/detumble_bdot": ("bdot", ["initial.rate_deg_per_s"]),
     "satellites/earth_pointing": ("mrp", ["initial.euler_321_deg", "initial.rate_deg_per_s"]),
     "satellites/safe_mode": ("modes", ["initial.euler_321_deg", "initial.rate_deg_per_s"]),

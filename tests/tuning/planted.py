@@ -37,7 +37,7 @@ class Planted:
     def write(self, file: Path, seed: int = 0, dispersed: int | None = None) -> Path:
         """Write the problem file; its requirement is P, `seed` is that of its noise.
 
-        Of the dispersions the first `dispersed` are kept, all by default; the causes are among the first.
+        Of the dispersions the first `dispersed` are kept, all by default; the slew does not break by its first five.
         """
         document = read(self.base)
         kept = [each for each in document.data["scheme"] if each["name"] == self.scheme]
