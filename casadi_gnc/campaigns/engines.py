@@ -10,13 +10,14 @@ import ctypes
 import os
 import platform
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
 
 from casadi_gnc.campaigns.program import BatchEngine, Flown, Program, Told, program_of
 from casadi_gnc.embedded.printer import Math
+from casadi_gnc.errors import CompilerError
 from casadi_gnc.missions.parameters import Varied
 from casadi_gnc.system import assets, compilers
 
@@ -27,8 +28,9 @@ VECTORS: dict[str, tuple[int, tuple[str, ...]]] = {
     "avx2": (4, ("-mavx2",)),
     "avx512": (8, ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mprefer-vector-width=512")),
 }
-#: gcc's partial redundancy elimination moves loads so that some loops over lanes are no longer vectorised.
 _LANES = ("-O3", "-fopenmp-simd", "-fno-math-errno", "-fno-trapping-math")
+#: gcc's partial redundancy elimination moves loads so that some loops over lanes are no longer vectorised.
+_KEEP = "-fno-tree-pre"
 
 
 class _Batch(ctypes.Structure):
@@ -88,10 +90,21 @@ class CompiledBatch(BatchEngine):
         self.compiler = compiler or compilers.find()
         self.source, self.flags, units = program.source, program.flags, program.units
         if self.lanes > 1:
-            own = () if "clang" in self.compiler.version else ("-fno-tree-pre",)
+            own = () if "clang" in self.compiler.version else (_KEEP,)
             self.source, self.flags, units = program.lanes, (*_LANES, *own, *kind, f"-DLANES={self.lanes}"), ()
         include = assets.folder("codegen") / "runtime"
-        library = compilers.load(self.source, include=include, flags=self.flags, units=units, compiler=self.compiler)
+        try:
+            library = compilers.load(
+                self.source, include=include, flags=self.flags, units=units, compiler=self.compiler
+            )
+        except CompilerError as error:
+            if "internal compiler error" not in str(error) or _KEEP not in self.flags:
+                raise
+            # GCC 12 ends with an error of its own on some tapes for two lanes; without the option it does not.
+            self.flags = tuple(flag for flag in self.flags if flag != _KEEP)
+            library = compilers.load(
+                self.source, include=include, flags=self.flags, units=units, compiler=self.compiler
+            )
         self._fly = library.gnc_fly_batch
         self._fly.restype, self._fly.argtypes = None, [ctypes.POINTER(_Batch)]
         self.threads = threads or os.cpu_count() or 1

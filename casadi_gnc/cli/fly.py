@@ -59,7 +59,10 @@ def fly(
     report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
-    """Fly a mission and write <scheme>.npz, summary.json and mission.json; of sweeps summary.json alone."""
+    """Fly a mission and write <scheme>.npz, summary.json and mission.json; of sweeps summary.json alone.
+
+    A case of a campaign is flown to be looked at: its pictures are drawn beside its records.
+    """
     from casadi_gnc.errors import ReportError
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.problem_files.loading import load
@@ -134,7 +137,7 @@ def _fly_case(
     json: bool,
     report: Path | None,
 ) -> None:
-    """Fly one case of a campaign again, word for word, and write it as any flight."""
+    """Fly one case of a campaign again, word for word, and write it as any flight, with its pictures."""
     from casadi_gnc.problem_files.by_name import open_campaign
     from casadi_gnc.system.files import prepare_folder
 
@@ -144,7 +147,7 @@ def _fly_case(
     with Progress(f"case {found.number}", quiet=json) as progress:
         flight = found.fly(decimation=decimation, progress=progress)
     flight.save(folder)
-    written = _keep(mission, [flight], folder, figures, ending, report)
+    written = _keep(mission, [flight], folder, folder if figures is None else figures, ending, report)
     if json:
         typer.echo((folder / "summary.json").read_text(encoding="utf-8"), nl=False)
     else:

@@ -403,6 +403,7 @@ def test_the_command_flies_shows_and_flies_a_case_again(problem, tmp_path):
     assert flight.returncode == 0, flight.stderr
     value = json.loads(flight.stdout)["schemes"][0]["metrics"]["settling_time"]["value"]
     assert value == worst["value"]
+    assert (tmp_path / "worst/observer_pinv.png").stat().st_size > 1e4
     told = run("fly", out, "--case", "worst:nothing")
     assert (told.returncode, told.stdout) == (2, "")
     assert "no metric 'nothing'; there is settling_time" in told.stderr
