@@ -10,7 +10,7 @@ import ctypes
 import os
 import platform
 from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
