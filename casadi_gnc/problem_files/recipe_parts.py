@@ -85,6 +85,49 @@ class OfPlant(Recipe):
         return {key: value for key, value in found.items() if key not in ("mission", "scheme", "at_s")}
 
 
+#: Of a box of starts of the state about zero.
+HalfWidths = Annotated[
+    Annotated[list[NonNegative], Field(min_length=1, max_length=12)] | None,
+    Field(description="of a box of starts of the state about zero, instead of vertices"),
+]
+Fastest = Annotated[Positive | None, Field(description="largest distance of a pole from zero")]
+Damping = Annotated[
+    Annotated[float, Field(gt=0.0, lt=1.0)] | None, Field(description="every pole's damping ratio is above this number")
+]
+Disc = Annotated[
+    Annotated[list[float], Field(min_length=2, max_length=2)] | None,
+    Field(description="centre, on the real axis, and radius of a disc that holds every pole [rad/s]"),
+]
+
+
+class InRegion(Recipe):
+    """Base of recipes that keep every pole in a region, if asked."""
+
+    fastest_rad_s: Fastest = None
+    decay_1_s: NonNegative | None = Field(default=None, description="every pole's real part is below minus this number")
+    damping: Damping = None
+    disc_rad_s: Disc = None
+
+
+class FromStarts(OfPlant):
+    """Base of recipes that judge the command from some starts, if given."""
+
+    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
+    half_widths: HalfWidths = None
+    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
+
+    @model_validator(mode="after")
+    def _starts(self) -> FromStarts:
+        return one_of_starts(self)
+
+
+def one_of_starts(part: Any) -> Any:
+    """Return a recipe whose starts are given at most once."""
+    if part.vertices is not None and part.half_widths is not None:
+        raise ValueError("give either vertices or half_widths, not both")
+    return part
+
+
 def _linearised(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return A and B of the mission that a recipe names, linearised."""
     from casadi_gnc.problem_files.loading import load
@@ -118,27 +161,3 @@ def _is_row(annotation: Any) -> bool:
 
 def _is_matrix(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], list)
-
-
-HalfWidths = Annotated[
-    Annotated[list[NonNegative], Field(min_length=1, max_length=12)] | None,
-    Field(description="of a box of starts of the state about zero, instead of vertices"),
-]
-
-
-def one_of_starts(part: Any) -> Any:
-    """Return a recipe whose starts are given at most once."""
-    if part.vertices is not None and part.half_widths is not None:
-        raise ValueError("give either vertices or half_widths, not both")
-    return part
-
-
-Fastest = Annotated[Positive | None, Field(description="largest distance of a pole from zero")]
-Decay = Annotated[NonNegative | None, Field(description="every pole's real part is below minus this number")]
-Damping = Annotated[
-    Annotated[float, Field(gt=0.0, lt=1.0)] | None, Field(description="every pole's damping ratio is above this number")
-]
-Disc = Annotated[
-    Annotated[list[float], Field(min_length=2, max_length=2)] | None,
-    Field(description="centre, on the real axis, and radius of a disc that holds every pole [rad/s]"),
-]

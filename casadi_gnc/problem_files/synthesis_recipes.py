@@ -14,10 +14,11 @@ from pydantic import Field, model_validator
 from casadi_gnc import synthesis
 from casadi_gnc.problem_files.recipe_parts import (
     Damping,
-    Decay,
     Disc,
     Fastest,
+    FromStarts,
     HalfWidths,
+    InRegion,
     OfPlant,
     Recipe,
     one_of_starts,
@@ -28,7 +29,7 @@ from casadi_gnc.synthesis.recipes.shi2020_theorem1 import theorem1
 from casadi_gnc.tables.part import NonNegative, Positive, Table
 
 
-class StateFeedback(OfPlant):
+class StateFeedback(FromStarts, InRegion):
     """u = -K x with the smallest H-infinity norm from w to z = C x + D u + F w."""
 
     E: Table | None = Field(default=None, description="of the disturbance; B if left out")
@@ -38,17 +39,6 @@ class StateFeedback(OfPlant):
     gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
     slack: Positive = 0.02
     margin: Positive = 1e-7
-    fastest_rad_s: Fastest = None
-    decay_1_s: Decay = None
-    damping: Damping = None
-    disc_rad_s: Disc = None
-    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
-    half_widths: HalfWidths = None
-    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
-
-    @model_validator(mode="after")
-    def _starts(self) -> StateFeedback:
-        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
@@ -56,7 +46,7 @@ class StateFeedback(OfPlant):
         return synthesis.state_feedback(**{"E": given["B"], **given}, backend=backend)
 
 
-class MixedStateFeedback(OfPlant):
+class MixedStateFeedback(FromStarts, InRegion):
     """u = -K x with the smallest H2 norm from w2 to z2 = C2 x + D2 u that keeps the H-infinity norm from w to z."""
 
     E: Table | None = Field(default=None, description="of the disturbance; B if left out")
@@ -68,17 +58,6 @@ class MixedStateFeedback(OfPlant):
     D2: Table
     gamma: Positive = Field(description="bound on the H-infinity norm")
     margin: Positive = 1e-7
-    fastest_rad_s: Fastest = None
-    decay_1_s: Decay = None
-    damping: Damping = None
-    disc_rad_s: Disc = None
-    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
-    half_widths: HalfWidths = None
-    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
-
-    @model_validator(mode="after")
-    def _starts(self) -> MixedStateFeedback:
-        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
@@ -86,7 +65,7 @@ class MixedStateFeedback(OfPlant):
         return synthesis.mixed_state_feedback(**{"E": given["B"], **given}, backend=backend)
 
 
-class Observer(Recipe):
+class Observer(InRegion):
     """L of an observer with the smallest H-infinity norm from w to G times the error."""
 
     A: Table
@@ -97,10 +76,6 @@ class Observer(Recipe):
     gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
     slack: Positive = 0.02
     margin: Positive = 1e-7
-    fastest_rad_s: Fastest = None
-    decay_1_s: Decay = None
-    damping: Damping = None
-    disc_rad_s: Disc = None
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
@@ -131,7 +106,7 @@ class InputEllipsoid(OfPlant):
         return synthesis.input_ellipsoid(**self.arguments(), backend=backend)
 
 
-class IntermediateObserver(OfPlant):
+class IntermediateObserver(FromStarts):
     """K and L of the intermediate-observer pair with the smallest certified gamma."""
 
     C: Table | None = None
@@ -139,13 +114,6 @@ class IntermediateObserver(OfPlant):
     s: Positive = Field(default=0.3, description="where X1^2 is replaced by its tangent")
     margin: Positive = 1e-6
     largest_gamma: Positive = 1e4
-    vertices: Table | None = Field(default=None, description="starts of the state, one a row, for the peak command")
-    half_widths: HalfWidths = None
-    limit: Positive | None = Field(default=None, description="of the peak command; a larger one is not certified")
-
-    @model_validator(mode="after")
-    def _starts(self) -> IntermediateObserver:
-        return one_of_starts(self)
 
     def run(self, backend: Any) -> Synthesis:
         """Return the gains with their certificate."""
