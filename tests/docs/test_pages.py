@@ -7,8 +7,11 @@ from running_pages import ROOT, run, sections
 
 from casadi_gnc.problem_files.document import shipped
 
-PAGES = ["allocation", "check", "command_line", "docking", "falsify", "flight_c", "margins", "synthesis"]
+PAGES = ["allocation", "check", "command_line", "docking", "falsify", "flight_c", "index", "margins", "synthesis"]
 HEADS = [(f"{page}.md", sections(f"{page}.md")[0]) for page in PAGES]
+HEADS += [
+    ("synthesis.md", section) for section in sections("synthesis.md") if section.title == "Structured uncertainty"
+]
 
 
 CASES = [
@@ -17,7 +20,7 @@ CASES = [
 
 
 @pytest.mark.slow  # first_law is the page that the fast tests run
-@pytest.mark.parametrize(("page", "section"), CASES, ids=PAGES)
+@pytest.mark.parametrize(("page", "section"), CASES, ids=[*PAGES, "synthesis, uncertainty"])
 def test_head(page, section, tmp_path):
     run(page, section, tmp_path)
 
