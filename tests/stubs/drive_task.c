@@ -3,16 +3,14 @@
 #include <stdlib.h>
 
 #include "FreeRTOS.h"
-#include "replay.h"
+#include "counted.h"
 #include "task.h"
 
-void sat_take(sat_input *input);
-void sat_give(const sat_output *output);
 void sat_refused(int32_t why);
 void sat_task(void *unused);
 extern volatile uint32_t sat_overruns;
 
-static long k, shifted, wrong, late;
+static long late;
 
 TickType_t xTaskGetTickCount(void) { return 7; }
 void vTaskDelete(TaskHandle_t task) { (void)task, exit(3); }
@@ -26,17 +24,10 @@ BaseType_t xTaskDelayUntil(TickType_t *previous, TickType_t period)
     return pdTRUE;
 }
 
-void sat_take(sat_input *input) { replay_load(k, input); }
-
 void sat_give(const sat_output *output)
 {
-    replay_word found[REPLAY_OUTPUTS];
-    int i;
-    replay_store(output, found);
-    shifted += (found[REPLAY_OUTPUTS - 1] & SAT_TIME_SHIFTED) != 0; /* after a period that was missed */
-    found[REPLAY_OUTPUTS - 1] &= ~(replay_word)SAT_TIME_SHIFTED;
-    for (i = 0; i < REPLAY_OUTPUTS; i++) wrong += found[i] != replay_outputs[k][i];
-    if (++k == REPLAY_STEPS) {
+    count(output);
+    if (k == REPLAY_STEPS) {
         (void)printf("%ld steps, %ld words differ, %u overruns, told %ld times\n", k, wrong, (unsigned)sat_overruns, shifted);
         exit(0);
     }
