@@ -28,13 +28,13 @@ class GainStatus(Enum):
     INFEASIBLE = "No gains meet the inequalities."
     UNBOUNDED = "The inequalities leave the objective without a bound."
     RUNS_AWAY = "The optimum is not attained, the gain runs to infinity: a bound is missing."
-    NOT_CERTIFIED = "The solver's answer does not keep the inequalities; no gain is returned."
+    NOT_CERTIFIED = "No gain is certified."
     UNSTABLE = "The closed loop has a pole that is not in the left half plane."
     NORM_EXCEEDED = "The closed loop's H-infinity norm is larger than the certified bound."
     ENERGY_EXCEEDED = "The closed loop's H2 norm is larger than the certified bound."
     POLES_OUTSIDE = "A pole of the closed loop lies outside a region that was asked for."
     INPUT_EXCEEDED = "The simulated command is larger than its limit."
-    UNDECIDED = "The solver returned neither gains nor a proof; change units, margins or the back end."
+    UNDECIDED = "No gain is returned."
 
 
 _OF_LMIS = {
