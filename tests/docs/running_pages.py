@@ -9,8 +9,8 @@ A fenced block of a page is
 * what the commands or the script before it print, where it is marked `text`: each line is among what came out, blanks
   aside; a line of dots stands for any others.
 
-Blocks marked `bash` install software and are not run. A section stands on those before it: their files are written,
-and their commands run that write more.
+Blocks marked `bash` install software, or read what only a user has, and are not run. A section stands on those before
+it: their files are written, and their commands run that write more.
 """
 
 import os
@@ -23,6 +23,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+#: Longest that one command may take.
+PATIENCE_S = 300
 #: Commands by which a section makes what later ones stand on.
 _MAKES = re.compile(r"^(casadi-gnc (new|problems copy|generate)|mkdir|cp|mv|sed|printf) ")
 #: Warnings are errors. Said in Python: at the option -W error pyparsing, below Matplotlib, warns of its own innards.
@@ -128,7 +130,7 @@ def _told(command: list[str], expected: int, folder: Path, environment: dict[str
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
-        timeout=300,
+        timeout=PATIENCE_S,
     )
     assert done.returncode == expected, f"{command[-1]}\nended with {done.returncode}:\n{done.stdout}"
     return done.stdout

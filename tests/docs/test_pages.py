@@ -3,6 +3,7 @@
 import re
 
 import pytest
+import running_pages
 from running_pages import ROOT, run, sections
 
 from casadi_gnc.problem_files.document import shipped
@@ -22,6 +23,22 @@ CASES = [
 @pytest.mark.slow  # first_law is the page that the fast tests run
 @pytest.mark.parametrize(("page", "section"), CASES, ids=[*PAGES, "synthesis, uncertainty"])
 def test_head(page, section, tmp_path):
+    run(page, section, tmp_path)
+
+
+#: What flies for minutes, or times solvers, or answers every claim of five papers.
+AT_LENGTH = [
+    pytest.param(f"{page}.md", section.title, marks=[pytest.mark.tools(*section.tools)] * bool(section.tools), id=page)
+    for page in ("allocation", "benchmarks", "drag_free", "proximity", "report", "reproduce", "wheels")
+    for section in sections(f"{page}.md")
+    if (f"{page}.md", section) not in HEADS and any(block.language == "sh" for block in section.blocks)
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("page", "section"), AT_LENGTH)
+def test_section_at_length(page, section, tmp_path, monkeypatch):
+    monkeypatch.setattr(running_pages, "PATIENCE_S", 1800)
     run(page, section, tmp_path)
 
 
