@@ -144,7 +144,7 @@ lock: $(UV)
 .venv-oldest/installed: pyproject.toml | $(UV)
 	@echo "Installing the oldest packages that pyproject.toml allows into .venv-oldest: about a minute."
 	$(PYTHON) -m venv .venv-oldest
-	$(UV) pip install --quiet --python .venv-oldest/bin/python --resolution lowest-direct --group build --editable '.[dev]' 'pyparsing<3.3'
+	$(UV) pip install --quiet --python .venv-oldest/bin/python --resolution lowest-direct --group build --editable '.[dev]' 'pyparsing>=3.2,<3.3'
 	touch $@
 
 clean:
