@@ -82,7 +82,7 @@ class Layout:
         return name in self.names
 
     def signal(self, name: str) -> Signal:
-        """Return the description of a signal; raise `KeyError` naming what there is."""
+        """Return the description of the signal of a name; raise `KeyError` naming what there is."""
         for signal in self.signals:
             if signal.name == name:
                 return signal
@@ -93,7 +93,7 @@ class Layout:
         return tuple(signal for signal in self.signals if signal.kind == kind)
 
     def place(self, name: str) -> slice:
-        """Return the rows that a signal occupies."""
+        """Return the rows that the signal of a name occupies."""
         start = 0
         for signal in self.signals:
             if signal.name == name:
@@ -123,7 +123,7 @@ class Layout:
         return ca.vertcat(*(parts[name] for name in self.names))
 
     def symbol(self, name: str) -> ca.SX:
-        """Return a fresh symbolic column."""
+        """Return a fresh symbolic column, whose symbols have this name."""
         return ca.SX.sym(name, self.size) if self.size else ca.SX(0, 1)
 
     def columns(self, samples: np.ndarray) -> dict[str, np.ndarray]:

@@ -63,7 +63,8 @@ def option(note: str, *choices: str, default: Any = dataclasses.MISSING) -> Any:
 class Law:
     """Base of all laws; `eq=False` because == on symbols is no bool.
 
-    A law that models the craft has a field `body`: it receives what the craft's software believes.
+    A law that models the craft has a field `body`: it receives what the craft's software believes. Its methods take t,
+    the time [s]; y, the measurement, a column of `inputs`; m, the memory, a column of `memory`.
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ class Law:
         return getattr(self.belief, "inertia", None)
 
     def sign(self, erratum: str) -> int:
-        """Return -1 where the source's sign is kept as printed, +1 where it is corrected."""
+        """Return -1 where the sign of an erratum is kept as printed (`printed`), +1 where it is corrected."""
         return -1 if erratum in self.printed else 1
 
     def check_hold(self) -> None:

@@ -136,7 +136,14 @@ class Actuation(Actuators):
 
     @classmethod
     def of(cls, actuators: Actuators, limit: Sequence[Any], allocator: Any) -> Actuation:
-        """Return the actuation of some actuators, with limits of the same magnitude on both sides."""
+        """Return the actuation of some actuators, with limits of the same magnitude on both sides.
+
+        Parameters
+        ----------
+        actuators : what makes the effort.
+        limit : largest magnitude of each row of the effort, (R,), in its unit.
+        allocator : who shares the effort out.
+        """
         if len(limit) != actuators.effort.size:
             raise FlightError(
                 f"{len(limit)} limits of the effort, expected {actuators.effort.size}, one for each row of "

@@ -138,7 +138,7 @@ class Craft(Part):
         return Scene.of(mission.truth.state)
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterable[Check]:
-        """Yield what only this craft can say of a mission before it flies."""
+        """Yield what only this craft can say of a mission, flown by a scheme, before it flies."""
         return ()
 
     def rehearses(self, mission: Mission, scheme: Scheme) -> bool:
@@ -146,7 +146,7 @@ class Craft(Part):
         return False
 
     def true_effectivenesses(self, mission: Mission, scheme: Scheme) -> Mapping[str, Any]:
-        """Return the effectivenesses, (R, N), that errors and faults may make true, by what they are."""
+        """Return the effectivenesses, (R, N), that errors and faults may make true under a scheme, by what they are."""
         return {}
 
     def flaws(self) -> Iterable[MisfitError]:
@@ -158,7 +158,7 @@ class Craft(Part):
         return ()
 
     def key_of(self, signal: str) -> tuple[str, ...]:
-        """Return the path of the key of a file that gives a state at the start, for messages."""
+        """Return the path of the key of a file that gives a signal of the state its start, for messages."""
         return ("initial",)
 
 

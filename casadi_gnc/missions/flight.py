@@ -144,7 +144,7 @@ class Flight:
         return names, self.samples
 
     def to_csv(self, target: str | Path) -> Path:
-        """Write all samples as a table: names in the first line, units in the second, every bit of every number."""
+        """Write all samples as a table into `target`: names first, then units, every bit of every number."""
         names, samples = self.columns()
         units = [signal.unit or "-" for signal in self.layout.signals for _ in range(signal.size)]
 
@@ -157,7 +157,7 @@ class Flight:
         return _written(target, ".csv", write)
 
     def to_mat(self, target: str | Path) -> Path:
-        """Write the signals as a MATLAB file of version 5, with their units in the struct `units`."""
+        """Write the signals as the MATLAB file `target`, of version 5, with their units in the struct `units`."""
         from scipy.io import savemat
 
         content = {**self.signals, "units": {name: self.unit(name) or "-" for name in self.layout.names}}
@@ -173,11 +173,11 @@ class Flight:
         return pandas.DataFrame(samples, columns=names).set_index("time")
 
     def save(self, folder: Path) -> Path:
-        """Write the signals as `<scheme>.npz` (with units under `unit_<name>`); return its path."""
+        """Write the signals as `<scheme>.npz` into a folder (with units under `unit_<name>`); return its path."""
         return self.save_as(folder / f"{self.scheme}.npz")
 
     def save_as(self, target: Path) -> Path:
-        """Write the signals as a file of another name; else as `save`."""
+        """Write the signals as the file `target`; else as `save`."""
         arrays: dict[str, Any] = dict(self.signals)
         arrays.update({f"unit_{name}": np.array(self.unit(name)) for name in self.layout.names})
         write_beside(target, lambda path: np.savez_compressed(path, **arrays))

@@ -149,7 +149,7 @@ class Mission:
         raise FlightError(f"no scheme {name!r} in {self.name}; {offer(name, known)}")
 
     def with_timing(self, **changes: Any) -> Mission:
-        """Return the mission with another `mode`, `sample_period`, `duration` or `substeps`.
+        """Return the mission with changes of `mode`, `sample_period`, `duration` or `substeps`.
 
         Raises `LawError` where a law cannot work at that sample period.
         """
@@ -162,7 +162,7 @@ class Mission:
         return changed
 
     def with_scheme(self, name: str | None = None, **changes: Any) -> Mission:
-        """Return the mission with one scheme only, changed: `law`, `feedback`, `actuation`, or gains by name."""
+        """Return the mission with one scheme only; changes are `law`, `feedback`, `actuation`, or gains by name."""
         scheme = self.scheme(name)
         own = {key: changes.pop(key) for key in _OF_A_SCHEME if key in changes}
         law = own.get("law", scheme.law)
@@ -217,7 +217,7 @@ class Mission:
         return functions.plant_rate(self)
 
     def linearised(self, scheme: str | None = None, at_s: float = 0.0) -> LinearPlant:
-        """Return A and B of the plant at its target at a time [s], by the efforts of a scheme; see `LinearPlant`.
+        """Return A and B of the plant at its target at a time `at_s`, by the efforts of a scheme; see `LinearPlant`.
 
         Raises
         ------
@@ -235,7 +235,10 @@ class Mission:
         return functions.law_function(self, self.scheme(scheme), parameters)
 
     def step(self, scheme: str | None = None, parameters: Sequence[ca.SX] = ()) -> ca.Function:
-        """Return one sample of the controller: (t, y, good, m, actuators, [p]) -> (actuators_next, m_next, ...)."""
+        """Return one sample of the controller: (t, y, good, m, actuators, [p]) -> (actuators_next, m_next, ...).
+
+        p has the `parameters`, symbols that the mission has in the place of numbers.
+        """
         return functions.step_function(self, self.scheme(scheme), parameters)
 
     def loop_start(self, scheme: str | None = None) -> dict[str, ca.DM]:
@@ -248,7 +251,8 @@ class Mission:
         Ports: `t` [s]; `x`, the plant's state in the order of `truth.state`; `m`, the law's memory;
         `actuators`, what they were last told; `good`, the last good measurement. Results: `x_next`,
         `m_next`, `actuators_next`, `good_next`, `wanted`, `limited`. `loop_start` gives the first values.
-        Noise is zero. Only schemes whose allocation is an expression have a closed loop.
+        Noise is zero. Only schemes whose allocation is an expression have a closed loop. The last port, `p`, has the
+        `parameters`, symbols that the mission has in the place of numbers.
         """
         return functions.closed_loop_function(self, self.scheme(scheme), parameters)
 

@@ -18,7 +18,8 @@ class Plant:
     """Base of all plants; a subclass is a frozen dataclass of its physical data.
 
     It names its columns (`state`, `measurement`, `inputs`, `noise`, `outputs`) and gives pure functions of
-    CasADi symbols. `rate` must be given; the others have defaults: perfect sensors, no noise.
+    CasADi symbols. `rate` must be given; the others have defaults: perfect sensors, no noise. They take t, the time
+    [s]; x, the state; actuators, what those are told, a column of `inputs`; noise, the numbers of `noise`.
     """
 
     #: What the plant remembers, a `Layout`; an attribute, or a property where it depends on the data. Must be given.

@@ -29,6 +29,23 @@ def test_every_argument_is_documented(name):
     assert lacking == []
 
 
+METHODS = [
+    pytest.param(thing, method, id=f"{name}.{method.__name__}")
+    for name in CALLED
+    if inspect.isclass(thing := getattr(gnc, name))
+    for name_of, method in inspect.getmembers(thing, lambda each: inspect.isfunction(each) or inspect.ismethod(each))
+    if not name_of.startswith("_") and (method.__module__ or "").startswith("casadi_gnc")
+]
+
+
+@pytest.mark.parametrize(("thing", "method"), METHODS)
+def test_every_argument_of_a_method_is_documented(thing, method):
+    """By itself or by its class, which says once what its methods take."""
+    told = f"{documentation(method)}\n{documentation(thing)}"
+    taken = [each for each in inspect.signature(method).parameters if each not in ("self", "cls")]
+    assert [each for each in taken if not re.search(rf"\b{each}\b", told)] == []
+
+
 SWALLOWING = [
     name
     for name in CALLED

@@ -122,7 +122,7 @@ class Requirement:
         return f"{least}{self.metric}" + ("" if self.at_most is None else f" <= {self.at_most:g}")
 
     def bind(self, layout: Layout, column: Any, period: float) -> Bound:
-        """Return what the formula says of signals; arguments and errors as for `normal.bind`."""
+        """Return what the formula says of a column with a layout and a period [s]; errors as for `normal.bind`."""
         try:
             return bind(self.condition, self.formula, layout, column, period)
         except RequirementError as error:
