@@ -53,6 +53,15 @@ def fits(name: str, matrix: np.ndarray, rows: int, columns: int) -> None:
         raise SynthesisError(f"{name} has shape {matrix.shape}, expected ({rows}, {columns})")
 
 
+def system(A: Any, B: Any, C: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the matrices of a system; raise `SynthesisError` where their shapes do not fit each other."""
+    A, B, C = matrices(A=A, B=B, C=C)
+    fits("A", A, len(A), len(A))
+    fits("B", B, len(A), B.shape[1])
+    fits("C", C, len(C), len(A))
+    return A, B, C
+
+
 def poles(A: np.ndarray) -> np.ndarray:
     """Return the eigenvalues of A, (n,), [rad/s], the slowest first."""
     values = np.linalg.eigvals(A)
@@ -84,11 +93,8 @@ def h_infinity_norm(A: Any, B: Any, C: Any, D: Any = None, *, relative: float = 
     >>> round(h_infinity_norm([[-2.0]], [[1.0]], [[3.0]]).upper, 6)
     1.5
     """
-    A, B, C = matrices(A=A, B=B, C=C)
+    A, B, C = system(A, B, C)
     (D,) = matrices(D=np.zeros((len(C), B.shape[1])) if D is None else D)
-    fits("A", A, len(A), len(A))
-    fits("B", B, len(A), B.shape[1])
-    fits("C", C, len(C), len(A))
     fits("D", D, len(C), B.shape[1])
     values = np.linalg.eigvals(A)
     if values.real.max(initial=-1.0) >= 0:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc.synthesis.analysis import fits, matrices
+from casadi_gnc.synthesis.analysis import system
 
 
 @dataclass(frozen=True)
@@ -50,10 +50,7 @@ def h_two_norm(A: Any, B: Any, C: Any) -> Energy:
     """
     from scipy.linalg import solve_continuous_lyapunov
 
-    A, B, C = matrices(A=A, B=B, C=C)
-    fits("A", A, len(A), len(A))
-    fits("B", B, len(A), B.shape[1])
-    fits("C", C, len(C), len(A))
+    A, B, C = system(A, B, C)
     if np.linalg.eigvals(A).real.max(initial=-1.0) >= 0:
         return Energy(np.inf, np.inf)
     X, Y = solve_continuous_lyapunov(A, -B @ B.T), solve_continuous_lyapunov(A.T, -C.T @ C)

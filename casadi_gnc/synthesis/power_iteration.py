@@ -60,9 +60,10 @@ def _passed(M: np.ndarray, places: Sequence[Any], seed: int) -> Iterator[np.ndar
     w, q = b, np.sign(rng.normal(size=len(places)))
     for _ in range(_STEPS):
         a = _unit(M @ b)
-        z, q = _forward(places, a, b, w, q)
-        w = _unit(M.conj().T @ z)
-        b, q = _backward(places, a, b, w, q)
+        q = _shares(places, a, b, w, q)
+        w = _unit(M.conj().T @ _aligned(places, w, a, q))
+        q = _shares(places, a, b, w, q)
+        b = _aligned(places, a, w, q)
         yield _perturbation(places, a, b, w, q)
         if not np.any(b):
             return
@@ -134,34 +135,26 @@ def _share(q: float, a: np.ndarray, b: np.ndarray, w: np.ndarray) -> float:
     return float(np.clip(alpha, -1.0, 1.0))
 
 
-def _forward(
-    places: Sequence[Any], a: np.ndarray, b: np.ndarray, w: np.ndarray, q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    z, q = np.zeros_like(a), q.copy()
+def _shares(places: Sequence[Any], a: np.ndarray, b: np.ndarray, w: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return the next values of the real blocks; those of the others stay."""
+    q = q.copy()
     for i, (kind, at) in enumerate(places):
         if kind == "real":
             q[i] = _share(q[i], a[at], b[at], w[at])
-            z[at] = q[i] * w[at]
-        elif kind == "complex":
-            z[at] = _phase(np.vdot(w[at], a[at])) * w[at]
-        else:
-            z[at] = np.linalg.norm(w[at]) * _unit(a[at])
-    return z, q
+    return q
 
 
-def _backward(
-    places: Sequence[Any], a: np.ndarray, b: np.ndarray, w: np.ndarray, q: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    after, q = np.zeros_like(a), q.copy()
+def _aligned(places: Sequence[Any], this: np.ndarray, other: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Return, block by block, what a perturbation of size one makes of `this` that is nearest to `other`."""
+    found = np.zeros_like(this)
     for i, (kind, at) in enumerate(places):
         if kind == "real":
-            q[i] = _share(q[i], a[at], b[at], w[at])
-            after[at] = q[i] * a[at]
+            found[at] = q[i] * this[at]
         elif kind == "complex":
-            after[at] = _phase(np.vdot(a[at], w[at])) * a[at]
+            found[at] = _phase(np.vdot(this[at], other[at])) * this[at]
         else:
-            after[at] = np.linalg.norm(a[at]) * _unit(w[at])
-    return after, q
+            found[at] = np.linalg.norm(this[at]) * _unit(other[at])
+    return found
 
 
 def _perturbation(places: Sequence[Any], a: np.ndarray, b: np.ndarray, w: np.ndarray, q: np.ndarray) -> np.ndarray:
