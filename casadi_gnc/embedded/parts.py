@@ -12,17 +12,13 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.embedded import programs
+from casadi_gnc.embedded.pieces import Piece, node_piece, table_piece
 from casadi_gnc.embedded.program_text import declare, print_program
 from casadi_gnc.embedded.programs import Callee, Port
 from casadi_gnc.embedded.scalars import Math, Real, c_constant
-from casadi_gnc.embedded.tables import Table, read_table
+from casadi_gnc.embedded.tables import read_table
 from casadi_gnc.errors import PrinterError
 from casadi_gnc.system.templates import template
-
-#: Largest linear system that is solved on board.
-MOST_UNKNOWNS = 32
-#: Most inputs of a table, and most degree of a spline.
-MOST_DIMENSIONS, MOST_DEGREE = 6, 7
 
 
 @dataclass
@@ -39,7 +35,7 @@ class Parts:
     real: Real = "double"
     status: str = "GNC"
     texts: list[str] = field(default_factory=list)
-    _known: dict[str, Callee] = field(default_factory=dict)
+    _known: dict[tuple[object, ...], Callee] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
     _functions: list[tuple[ca.Function, Callee]] = field(default_factory=list)
     _called: dict[int, int] = field(default_factory=dict)
@@ -59,6 +55,7 @@ class Parts:
             zero=c_constant(0.0, self.real),
             one=c_constant(1.0, self.real),
             fabs=f"{'gnc_' if self.maths == 'gnc' else ''}fabs{suffix}",
+            nan=f"gnc_nan{suffix}_()" if self.maths == "gnc" else "(gnc_real)NAN",
             epsilon=c_constant(float(np.finfo(np.float64 if wide else np.float32).eps), self.real),
             dimensions=self._dimensions,
             degree=self._degree,
@@ -87,8 +84,8 @@ class Parts:
             return self._branches(function, place)
         if kind in ("Map", "ThreadMap", "OmpMap"):
             return self._loop(function, place)
-        if kind in ("LinearInterpolant", "BSplineInterpolant"):
-            return self._table(read_table(function, place), function.name(), place)
+        if kind in ("LinearInterpolant", "LinearInterpolantJac", "BSplineInterpolant"):
+            return self._piece(table_piece(read_table(function, place), function.name(), place, self.real))
         if function.is_a("MXFunction"):
             self._count(function)
         made = programs.program(function, place, self._is_kept, self._printed)
@@ -113,14 +110,10 @@ class Parts:
         return size > programs.SMALL and max(again, 2 * calls) * size > programs.WRITTEN_OUT
 
     def _printed(self, function: ca.Function, k: int, place: str) -> Callee:
-        code, node = function.instruction_id(k), function.instruction_MX(k)
-        if code == ca.OP_CALL:
+        node = function.instruction_MX(k)
+        if function.instruction_id(k) == ca.OP_CALL:
             return self.function(node.which_function(), place)
-        if code == ca.OP_BSPLINE:
-            point = ca.MX.sym("x", node.dep(0).sparsity())
-            alone = ca.Function("spline", [point], ca.graph_substitute([node], [node.dep(0)], [point]))
-            return self._table(read_table(alone, f"{place}, a spline"), "spline", place)
-        return self._solve(node, place)
+        return self._piece(node_piece(node, place, self.real))
 
     def _name(self, wanted: str) -> str:
         """Return a name in C that nothing of the package has."""
@@ -166,64 +159,16 @@ class Parts:
         lines = [*(f"    (void){port.name};" for port in (*inputs, *outputs) if not port.size), *lines]
         return self._add(function.name(), inputs, outputs, each.asks, lines)
 
-    def _table(self, table: Table, name: str, place: str) -> Callee:
-        """Print an interpolant; the same table is one function, however often it is made."""
-        key = repr((table.starts, table.grid, table.values, table.modes, table.outputs, table.degrees))
-        if key in self._known:
-            return self._known[key]
-        degree = max(table.degrees, default=1)
-        if table.dimensions > MOST_DIMENSIONS or degree > MOST_DEGREE:
-            raise PrinterError(
-                f"{place}, {name} is a table of {table.dimensions} inputs and degree {degree}, expected at most "
-                f"{MOST_DIMENSIONS} and {MOST_DEGREE}"
+    def _piece(self, piece: Piece) -> Callee:
+        """Print a piece; the same text is one function, however often it is made."""
+        if piece.text not in self._known:
+            self._dimensions = max(self._dimensions, piece.dimensions)
+            self._degree = max(self._degree, piece.degree)
+            self._used.update(piece.helpers)
+            self._known[piece.text] = self._add(
+                piece.name, piece.inputs, piece.outputs, piece.asks, list(piece.lines)
             )
-        self._dimensions, self._degree = max(self._dimensions, table.dimensions), max(self._degree, degree)
-        which = "spline" if table.degrees else "interpolate"
-        self._used |= {which, "find_interval"}
-        lines = [self._array("int32_t", "starts", map(str, table.starts))]
-        lines += [self._array("gnc_real", "grid", (c_constant(one, self.real) for one in table.grid))]
-        lines += [self._array("gnc_real", "values", (c_constant(one, self.real) for one in table.values))]
-        lines += [self._array("int32_t", "even", map(str, table.modes))]
-        lines += [self._array("int32_t", "degrees", map(str, table.degrees))] if table.degrees else []
-        given = "starts, grid, values, even, " + ("degrees, " if table.degrees else "")
-        lines += [f"    {which}({table.dimensions}, {given}{table.outputs}, x0, y0);"]
-        inputs, outputs = (Port("x0", table.dimensions),), (Port("y0", table.outputs),)
-        self._known[key] = self._add(name, inputs, outputs, False, lines)
-        return self._known[key]
-
-    def _array(self, kind: str, name: str, values: object) -> str:
-        entries = list(values)  # type: ignore[call-overload]
-        rows = [", ".join(entries[i : i + 6]) for i in range(0, len(entries), 6)]
-        body = (",\n" + " " * 8).join(rows)
-        return f"    static const {kind} {name}[{len(entries)}] = {{\n{' ' * 8}{body}\n    }};"
-
-    def _solve(self, node: ca.MX, place: str) -> Callee:
-        """Print the solution of a linear system of this size and with these zeros in its matrix."""
-        right, matrix = node.dep(0).sparsity(), node.dep(1).sparsity()
-        n, columns = right.shape
-        if n > MOST_UNKNOWNS:
-            kind = "dense" if matrix.is_dense() else f"sparse ({matrix.nnz()} entries)"
-            raise PrinterError(
-                f"{place} solves a {kind} linear system of {n} unknowns, expected at most {MOST_UNKNOWNS}; solve it in "
-                "blocks, or write its elimination in CasADi symbols"
-            )
-        if not right.is_dense():
-            raise PrinterError(f"{place} solves a linear system with a sparse right-hand side; densify it")
-        transposed = bool(node.info().get("tr", False))
-        key = f"solve {n} {columns} {transposed} {matrix.row()} {matrix.colind()}"
-        if key in self._known:
-            return self._known[key]
-        self._used.add("solve_linear")
-        lines = [f"    gnc_real matrix[{n * n}];", f"    gnc_real lu[{n * n}];", f"    int32_t row[{n}];"]
-        lines += ["    int32_t i;", f"    for (i = 0; i < {n * n}; ++i) {{"]
-        lines += [f"        matrix[i] = {c_constant(0.0, self.real)};", "    }"]
-        for k, (i, j) in enumerate(zip(matrix.row(), matrix.get_col(), strict=True)):
-            lines.append(f"    matrix[{j + i * n if transposed else i + j * n}] = x1[{k}];")
-        lines += [f"    for (i = 0; i < {n * columns}; ++i) {{", "        y0[i] = x0[i];", "    }"]
-        lines += [f"    solve_linear({n}, {columns}, matrix, lu, row, y0, status);"]
-        inputs = (Port("x0", n * columns), Port("x1", matrix.nnz()))
-        self._known[key] = self._add(f"solve_{n}", inputs, (Port("y0", n * columns),), True, lines)
-        return self._known[key]
+        return self._known[piece.text]
 
     def _add(
         self, name: str, inputs: tuple[Port, ...], outputs: tuple[Port, ...], asks: bool, lines: list[str]

@@ -88,7 +88,7 @@ class Order:
 
         for call in self._program.calls:
             for argument in call.arguments:
-                if self.source(argument) is None:
+                if self.source(argument) is None and not self.is_table(argument):
                     need(argument)
             items.append(call)
         need(node for _, at, node in self._program.stores if node in stores)

@@ -21,16 +21,16 @@ MOST_OPERATIONS = 1_000_000
 #: What calls may add to a text by being written out; and a function that is smaller always is.
 WRITTEN_OUT, SMALL = 200, 25
 _REFUSED = {
-    ca.OP_GETNONZEROS_PARAM: "picks elements by a computed index",
     ca.OP_SETNONZEROS_PARAM: "writes elements at a computed index",
     ca.OP_ADDNONZEROS_PARAM: "adds to elements at a computed index",
     ca.OP_FIND: "searches the first element that is not zero",
-    ca.OP_LOW: "searches an interval",
     ca.OP_ASSERTION: "asserts something",
     ca.OP_MONITOR: "prints what it sees",
     ca.OP_DUMP: "writes to a file",
     ca.OP_CONVEXIFY: "changes eigenvalues",
 }
+#: Nodes that are no scalars, whatever is in them.
+_PIECES = (ca.OP_BSPLINE, ca.OP_LOW, ca.OP_GETNONZEROS_PARAM)
 _ROOTS = "write a fixed number of Newton steps in CasADi symbols"
 _STEPS = 'take the "rk" integrator with the option simplify=True, or write the steps in CasADi symbols'
 _OUTSIDE = "its C is not CasADi's to print; call it beside the package, and pass what it gives"
@@ -41,7 +41,6 @@ _REMEDIES = {
     **dict.fromkeys(("Newton", "FastNewton", "KinsolInterface", "ImplicitToNlp"), _ROOTS),
     **dict.fromkeys(("RungeKutta", "Collocation", "CvodesInterface", "IdasInterface"), _STEPS),
     **dict.fromkeys(("External", "GenericExternal"), _OUTSIDE),
-    "LinearInterpolantJac": "where a slope of a table is needed, make the table a B-spline",
     "CallbackInternal": "Python does not fly; write it in CasADi symbols, or pass what it gives",
 }
 
@@ -101,20 +100,42 @@ def ports(function: ca.Function) -> tuple[tuple[Port, ...], tuple[Port, ...]]:
     return inputs, tuple(Port(f"y{i}", function.nnz_out(i)) for i in range(function.n_out()))
 
 
+def _has_calls(function: ca.Function) -> bool:
+    return any(function.instruction_id(k) == ca.OP_CALL for k in range(function.n_instructions()))
+
+
+def _opened(function: ca.Function) -> ca.Function:
+    """Return the function without its option never_inline, which closes its body even to the one who prints it."""
+    return function.slice(function.name(), list(range(function.n_in())), list(range(function.n_out())))
+
+
+def is_never_inlined(function: ca.Function) -> bool:
+    """Tell whether whoever made a plain function wants it to stay one, by CasADi's option never_inline."""
+    symbols = function.sx_in()
+    return _has_calls(ca.Function("probe", symbols, function.call(symbols)))
+
+
 def is_plain(function: ca.Function) -> bool:
     """Tell whether a function is scalars alone: no branch, map, table or linear system in it or in what it calls."""
     if function.is_a("SXFunction"):
-        return True
+        return not _has_calls(function)
     if not function.is_a("MXFunction"):
         return False
     for k in range(function.n_instructions()):
         code = function.instruction_id(k)
         if code == ca.OP_CALL:
-            if not is_plain(function.instruction_MX(k).which_function()):
+            called = function.instruction_MX(k).which_function()
+            if not is_plain(called) or is_never_inlined(called):
                 return False
-        elif code == ca.OP_BSPLINE or code in _REFUSED or (code == ca.OP_SOLVE and not _is_triangular(function, k)):
+        elif code in _REFUSED or _is_piece(function, k):
             return False
     return True
+
+
+def _is_piece(function: ca.Function, k: int) -> bool:
+    """Tell whether an instruction that is no call has a C function of its own."""
+    code = function.instruction_id(k)
+    return code in _PIECES or (code == ca.OP_SOLVE and not _is_triangular(function, k))
 
 
 def _is_triangular(function: ca.Function, k: int) -> bool:
@@ -129,7 +150,7 @@ def expanded(function: ca.Function, place: str) -> ca.Function:
         found = function
     else:
         try:
-            found = function.expand()
+            found = _opened(function).expand()
         except RuntimeError as error:
             node = re.search(r"not defined for (?:class )?(?:N6casadi\d+)?(\w+?)E?$", str(error).strip())
             said = f"has a node {node[1]}" if node else f"is no scalars ({str(error).strip().splitlines()[-1][-200:]})"
@@ -175,13 +196,13 @@ def program(function: ca.Function, place: str, is_kept: Callable[[ca.Function], 
         For an operation that has no C form, and for functions that are too large.
     """
     inputs, outputs = ports(function)
-    if function.is_a("SXFunction"):
+    if function.is_a("SXFunction") and not _has_calls(function):
         nodes, stores = _scalars(check_size(function, place), inputs, outputs)
         return Program(inputs, outputs, nodes, stores)
-    if not function.is_a("MXFunction"):
+    if not (function.is_a("MXFunction") or function.is_a("SXFunction")):
         raise refuse(function, place)
     given = function.mx_in()
-    results = function.call(given, True, False)
+    results = _opened(function).call(given, True, False)
     flat = ca.Function("flat", given, results)
     cut, names, arguments, callees, arrays = [], [], [], [], []
     for k in range(flat.n_instructions()):
@@ -215,11 +236,10 @@ def _piece(function: ca.Function, k: int, place: str, is_kept: Callable[[ca.Func
         raise PrinterError(f"{place}: a node {_REFUSED[code]}, which has no C form here; rewrite it without")
     if code == ca.OP_CALL:
         called = node.which_function()
-        if is_plain(called) and not is_kept(called):
+        if is_plain(called) and not is_never_inlined(called) and not is_kept(called):
             return None
         return [node.get_output(i) for i in range(node.n_out())]
-    is_piece = code == ca.OP_BSPLINE or (code == ca.OP_SOLVE and not _is_triangular(function, k))
-    return [node] if is_piece else None
+    return [node] if _is_piece(function, k) else None
 
 
 def _scalars(

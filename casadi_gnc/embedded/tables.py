@@ -14,7 +14,8 @@ import numpy as np
 from casadi_gnc.errors import PrinterError
 
 _ARRAY = re.compile(r"static const casadi_(?:real|int) (casadi_[cs]\d+)\[\d+\] =\s*\{([^}]*)\}", re.DOTALL)
-_LINEAR = re.compile(r"casadi_interpn\(res\[0\], (\d+), (\w+), (\w+), (\w+), arg\[0\], (\w+), (\d+), iw, w\)")
+_LINEAR = re.compile(r"casadi_interpn(_grad)?\(res\[0\], (\d+), (\w+), (\w+), (\w+), arg\[0\], (\w+), ?(\d+), iw, w\)")
+_SEARCH = re.compile(r"casadi_low\(\*cr, [^,]+, \d+, (\d)\)")
 _SPLINE = re.compile(
     r"nd_boor_eval\)?\((?:\(&\w+\)|\w+), ?(\d+), ?(\w+), ?(\w+), ?(\w+), ?(\w+), ?(\w+), ?(\d+), "
     r"?(?:\(&\w+\)|\w+), ?(\w+), ?iw, ?w\)"
@@ -33,6 +34,7 @@ class Table:
     modes : of the search, by dimension: 1 where the grid is even and a division finds the place.
     outputs : numbers of a result.
     degrees : of the spline, by dimension; empty for linear tables.
+    slopes : whether the result are the derivatives by each input, (outputs, dimensions), not the values.
     """
 
     starts: tuple[int, ...]
@@ -41,6 +43,7 @@ class Table:
     modes: tuple[int, ...]
     outputs: int
     degrees: tuple[int, ...] = ()
+    slopes: bool = False
 
     @property
     def dimensions(self) -> int:
@@ -57,6 +60,13 @@ def _text(function: ca.Function) -> tuple[str, dict[str, list[str]]]:
     }
 
 
+def search_mode(node: ca.MX) -> int:
+    """Return how `low` searches: 1 where its grid is even and a division finds the place."""
+    grid, point = ca.MX.sym("grid", node.dep(0).sparsity()), ca.MX.sym("point", node.dep(1).sparsity())
+    alone = ca.graph_substitute([node], [node.dep(0), node.dep(1)], [grid, point])
+    return int(_SEARCH.findall(_text(ca.Function("search", [grid, point], alone))[0])[0])
+
+
 def read_table(function: ca.Function, place: str) -> Table:
     """Return the table of an interpolant, or of a function that is one B-spline.
 
@@ -65,7 +75,7 @@ def read_table(function: ca.Function, place: str) -> Table:
     PrinterError
         For tables whose grid or values are arguments, or are no finite numbers.
     """
-    if function.n_in() != 1:
+    if function.n_in() != 1 and function.class_name() != "LinearInterpolantJac":
         raise PrinterError(f"{place} is an interpolant whose values are arguments; give the values when it is made")
     try:
         text, arrays = _text(function)
@@ -74,9 +84,10 @@ def read_table(function: ca.Function, place: str) -> Table:
         raise PrinterError(f"{place} is an interpolant that CasADi cannot write down: {said}") from None
     linear, spline = _LINEAR.findall(text), _SPLINE.findall(text)
     if len(linear) == 1:
-        _, grid, starts, values, modes, outputs = linear[0]
+        slopes, _, grid, starts, values, modes, outputs = linear[0]
         degrees: list[str] = []
     elif len(spline) == 1:
+        slopes = ""
         _, grid, starts, degree, _, values, outputs, modes = spline[0]
         degrees = arrays[degree]
     else:
@@ -88,6 +99,7 @@ def read_table(function: ca.Function, place: str) -> Table:
         modes=tuple(int(one or 0) for one in arrays.get(modes, ["0"])),
         outputs=int(outputs),
         degrees=tuple(map(int, degrees)),
+        slopes=bool(slopes),
     )
     if not (np.isfinite(found.grid).all() and np.isfinite(found.values).all()):
         raise PrinterError(f"{place} is a table with an entry that is no finite number; put that entry right")

@@ -40,7 +40,7 @@ def test_pieces_are_printed_once_and_as_what_they_are():
     parts = Parts()
     parts.function(everything())
     text = parts.text()
-    for piece in ("f_uneven", "f_both", "f_smooth", "f_solve_3"):
+    for piece in ("f_uneven", "f_both", "f_smooth", "f_solve_3", "f_jac_uneven"):
         assert len(re.findall(rf"static void {piece}\(", text)) == 1, piece
     assert "for (k = 0; k < 3; ++k)" in text
     x, u = ca.SX.sym("x", 3), ca.SX.sym("u")
@@ -51,6 +51,23 @@ def test_pieces_are_printed_once_and_as_what_they_are():
     many.function(ca.Function("step", [x, u], [later]).mapaccum("steps", 100))
     assert many.text().count("gnc_cos(") == 20  # those of one step, not of a hundred
     assert re.search(r"if \(\(which > -1\.\) && \(which < 1\.\)\)", text)
+
+
+def test_functions_that_are_never_inlined_stay_functions_wherever_they_are_called(rng):
+    x, y = ca.SX.sym("x", 3), ca.MX.sym("y", 3)
+    closed = {"never_inline": True}
+    both = ca.Function("both", [x], [ca.sin(x), ca.sum1(x)], closed)
+    one = ca.Function("one", [y], [ca.cos(y) * both(y)[1]], closed)
+    other = ca.Function("one", [y], [y * y], closed)  # another one of the same name
+    of_scalars = ca.Function("of_scalars", [x], [one(both(x)[0] * 2) + other(x)])
+    of_matrices = ca.Function("of_matrices", [y], [one(one(y)) + other(both(y)[0])], closed)
+    loop = of_matrices.map(4)
+    printed = Printed([of_scalars, of_matrices, loop])
+    for name in ("f_both", "f_one", "f_one_2", "f_of_matrices"):
+        assert len(re.findall(rf"static void {name}\(", printed.parts.text())) == 1, name
+    for k, function in enumerate(printed.functions):
+        given = rng.normal(size=function.nnz_in(0))
+        assert same_words(printed(k, given)[1][0], on_the_machine(function, given)[0])
 
 
 @pytest.mark.parametrize(
@@ -133,7 +150,7 @@ def refused() -> dict[str, tuple[ca.Function, str]]:
             within(ca.solve(sparse, ca.MX.ones(40)), sparse),
             r"sparse \(118 entries\) linear system of 40 unknowns",
         ),
-        "index": (within(x[index], x, index), "outer: a node picks elements by a computed index"),
+        "find": (within(ca.find(x), x), "outer: a node searches the first element that is not zero"),
         "logsumexp": (within(ca.logsumexp(x), x), "outer has a node LogSumExp, which has no C form here"),
         "nan": (
             within(ca.interpolant("bad", "linear", [[0, 1]], [1, np.nan])(index), index),
