@@ -91,6 +91,9 @@ def _print(title: str, found: dict[str, Any]) -> None:
     typer.echo(title)
     typer.echo(f"{found['status']}: {found['sentence']}")
     for name, gain in found["gains"].items():
+        if isinstance(gain, float):
+            typer.echo(f"{name} = {gain:.6g}")
+            continue
         typer.echo(f"{name} =")
         for row in gain:
             typer.echo("  [" + ", ".join(f"{value:.6g}" for value in row) + "]")

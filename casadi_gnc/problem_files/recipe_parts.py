@@ -100,6 +100,10 @@ Disc = Annotated[
 ]
 
 
+#: Of a gain, by rows: which entries are zero, and which the same number.
+Structure = Annotated[list[Annotated[list[int | str], Field(min_length=1)]], Field(min_length=1)]
+
+
 class InRegion(Recipe):
     """Base of recipes that keep every pole in a region, if asked."""
 
@@ -156,8 +160,13 @@ def _takes_matrix(annotation: Any) -> bool:
 
 def _is_row(annotation: Any) -> bool:
     inner = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
-    return get_origin(inner) is list
+    return get_origin(inner) is list and get_args(inner)[0] is float
 
 
 def _is_matrix(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and isinstance(value[0], list)
+    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and not _holds_labels(value)
+
+
+def _holds_labels(rows: list[list[Any]]) -> bool:
+    """Return whether rows are of whole numbers and names, and no matrix."""
+    return all(isinstance(entry, (int, str)) for row in rows for entry in row)

@@ -21,6 +21,7 @@ from casadi_gnc.problem_files.recipe_parts import (
     InRegion,
     OfPlant,
     Recipe,
+    Structure,
     one_of_starts,
 )
 from casadi_gnc.registry import Registry
@@ -63,6 +64,30 @@ class MixedStateFeedback(FromStarts, InRegion):
         """Return the gains with their certificate."""
         given = self.arguments()
         return synthesis.mixed_state_feedback(**{"E": given["B"], **given}, backend=backend)
+
+
+class OutputFeedback(FromStarts, InRegion):
+    """u = -K y, y = M x + N w, of any structure, with a small H-infinity norm from w to z = C x + D u + F w."""
+
+    E: Table | None = Field(default=None, description="of the disturbance; B if left out")
+    C: Table
+    D: Table
+    F: Table | None = None
+    M: Table | None = Field(default=None, description="of the measurement; the state if left out")
+    N: Table | None = Field(default=None, description="of w in the measurement; none if left out")
+    structure: Structure | None = Field(
+        default=None,
+        description="of K: 0, or a whole number or name for each number in it, with a minus for its negative",
+    )
+    gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
+    slack: Positive = 0.02
+    tries: Annotated[int, Field(ge=1, le=1000)] = Field(default=6, description="starts of the search")
+    margin: Positive = 1e-7
+
+    def run(self, backend: Any) -> Synthesis:
+        """Return the gains with their certificate."""
+        given = self.arguments()
+        return synthesis.output_feedback(**{"E": given["B"], **given}, backend=backend)
 
 
 class Observer(InRegion):
@@ -147,6 +172,7 @@ REGISTRY = Registry(
     {
         "state_feedback": f"{__name__}:StateFeedback",
         "mixed_state_feedback": f"{__name__}:MixedStateFeedback",
+        "output_feedback": f"{__name__}:OutputFeedback",
         "observer": f"{__name__}:Observer",
         "input_ellipsoid": f"{__name__}:InputEllipsoid",
         "intermediate_observer": f"{__name__}:IntermediateObserver",

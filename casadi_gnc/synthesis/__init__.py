@@ -25,6 +25,7 @@ from casadi_gnc.synthesis.recipes.input_ellipsoid import input_ellipsoid
 from casadi_gnc.synthesis.recipes.intermediate_observer import intermediate_observer, sample_s
 from casadi_gnc.synthesis.recipes.mixed_state_feedback import mixed_state_feedback
 from casadi_gnc.synthesis.recipes.observer import observer
+from casadi_gnc.synthesis.recipes.output_feedback import output_feedback
 from casadi_gnc.synthesis.recipes.state_feedback import state_feedback
 from casadi_gnc.synthesis.structured import MuBounds, Uncertainty, mu_bounds, mu_of_loop
 from casadi_gnc.synthesis.unknowns import block_matrix
@@ -53,6 +54,7 @@ __all__ = [
     "mu_bounds",
     "mu_of_loop",
     "observer",
+    "output_feedback",
     "peak_command",
     "poles",
     "sample_s",

@@ -95,10 +95,24 @@ def covariance_root(A: np.ndarray, B: np.ndarray, E: np.ndarray, C: np.ndarray, 
     P = _riccati(a, b, e, c, D, np.inf)
     if P is None:
         return np.diag(units)
-    loop = a - b @ np.linalg.solve(_definite(D.T @ D), b.T @ P + (c.T @ D).T)
+    loop = a - b @ _gain(P, b, c, D)
     X = solve_continuous_lyapunov(loop, -e @ e.T)
     X = (X + X.T) / 2 + _FLOOR * float(np.trace(X)) / len(X) * np.eye(len(X))
     try:
         return units[:, None] * np.linalg.cholesky(X)
     except np.linalg.LinAlgError:
         return np.diag(units)
+
+
+def regulator(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Return K, (m, n), of the linear-quadratic regulator u = -K x for z = C x + D u; zeros where there is none."""
+    units = _units(A)
+    a, b, c = A / units[:, None] * units, B / units[:, None], C * units
+    P = _riccati(a, b, np.zeros((len(a), 1)), c, D, np.inf)
+    if P is None:
+        return np.zeros((B.shape[1], len(A)))
+    return _gain(P, b, c, D) / units
+
+
+def _gain(P: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> np.ndarray:
+    return np.linalg.solve(_definite(d.T @ d), b.T @ P + (c.T @ d).T)

@@ -33,6 +33,7 @@ class GainStatus(Enum):
     NORM_EXCEEDED = "The closed loop's H-infinity norm is larger than the certified bound."
     ENERGY_EXCEEDED = "The closed loop's H2 norm is larger than the certified bound."
     POLES_OUTSIDE = "A pole of the closed loop lies outside a region that was asked for."
+    NOT_FOUND = "No gains were found, by a search that is local and proves nothing."
     INPUT_EXCEEDED = "The simulated command is larger than its limit."
     UNDECIDED = "No gain is returned."
 
@@ -62,7 +63,7 @@ class Synthesis:
     limit : of the command; NaN if none was given.
     ratios : interval of r = (assumed mass) / (true mass), or of any factor of the input matrix, about one
         within which the loop stays stable; None where the loop does not hold the input matrix.
-    missing : what would bound a gain that runs away.
+    missing : what would bound a gain that runs away, or what a search did not find.
     smallest : between which the smallest gamma lies: a bound from the multipliers, without margins, and what was
         reached; None where it was not sought.
     energy : the H2 norm and what was promised of it; None if it was not asked.
@@ -108,6 +109,8 @@ class Synthesis:
         if self.status is GainStatus.POLES_OUTSIDE:
             left = ", ".join(f"{name!r} by {-depth:.2g}" for name, depth in self.depths.items() if not depth > 0)
             return f"{said} It leaves {left} rad/s."
+        if self.status is GainStatus.NOT_FOUND:
+            return f"{said} {self.missing}"
         if self.status is GainStatus.UNSTABLE or self.status is GainStatus.RUNS_AWAY:
             slowest, fastest = self.poles[0], self.poles[np.argmax(np.abs(self.poles))]
             found = f"{said} Slowest pole {slowest:.3g}, fastest {fastest:.3g} rad/s."

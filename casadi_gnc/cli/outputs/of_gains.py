@@ -157,7 +157,8 @@ class Synthesis(TypedDict):
     status: str
     sentence: str
     certified: bool
-    gains: dict[str, list[list[float]]]
+    gains: dict[str, list[list[float]] | float]
+    """Matrices by rows; a number where a structure names it."""
     backend: str
     conflict: list[str]
     """Inequalities that cannot hold together."""

@@ -29,11 +29,12 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.errors import SynthesisError
-from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
+from casadi_gnc.synthesis.analysis import h_infinity_norm
 from casadi_gnc.synthesis.balancing import covariance_root
 from casadi_gnc.synthesis.energy import h_two_norm
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, failed, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
+from casadi_gnc.synthesis.performance import performance
 from casadi_gnc.synthesis.recipes.two_steps import with_small_margins
 from casadi_gnc.synthesis.regions import regions
 from casadi_gnc.synthesis.unknowns import block_matrix
@@ -93,21 +94,11 @@ def mixed_state_feedback(
     >>> found.status.name, round(found.energy.promised, 2)
     ('CERTIFIED', 1.0)
     """
-    A, B, E, C, D, C2, D2 = matrices(A=A, B=B, E=E, C=C, D=D, C2=C2, D2=D2)
-    n, m, q, p = len(A), B.shape[1], E.shape[1], len(C)
-    F, E2 = matrices(F=np.zeros((p, q)) if F is None else F, E2=E if E2 is None else E2)
-    for name, matrix, rows, columns in (
-        ("A", A, n, n),
-        ("B", B, n, m),
-        ("E", E, n, q),
-        ("C", C, p, n),
-        ("D", D, p, m),
-        ("F", F, p, q),
-        ("C2", C2, len(C2), n),
-        ("D2", D2, len(C2), m),
-        ("E2", E2, n, E2.shape[1]),
-    ):
-        fits(name, matrix, rows, columns)
+    plant = performance(A, B, E, C, D, F)
+    A, B, E, C, D, F = plant.A, plant.B, plant.E, plant.C, plant.D, plant.F
+    n, m, q, p = plant.sizes
+    second = performance(A, B, E if E2 is None else E2, C2, D2, suffix="2")
+    E2, C2, D2 = second.E, second.C, second.D
     if not (np.isfinite(gamma) and gamma > 0):
         raise SynthesisError(f"gamma is {gamma}, expected a positive number: the bound on the H-infinity norm")
     vertices, most = starts(vertices, limit, n)
@@ -133,7 +124,7 @@ def mixed_state_feedback(
         return failed(answer)
     K = np.linalg.solve(answer["X"], answer["W"].T).T @ T
     promised, least = (float(np.sqrt(max(square, 0.0))) for square in (answer.objective, answer.least))
-    loop, priced = A - B @ K, int(np.linalg.matrix_rank(D2))
+    loop = A - B @ K
     return certify_gains(
         {"K": K},
         answer,
@@ -146,7 +137,5 @@ def mixed_state_feedback(
         peak=peak_from(loop, K, vertices, plant_rate(A, B)),
         limit=most,
         parts=(A, -B @ K),
-        missing="Give fastest_rad_s."
-        if priced == m
-        else f"z2 prices {priced} of {m} commands: add rows with the others to D2, or give fastest_rad_s.",
+        missing=second.missing,
     )

@@ -27,11 +27,12 @@ from typing import Any
 
 import numpy as np
 
-from casadi_gnc.synthesis.analysis import fits, h_infinity_norm, matrices
+from casadi_gnc.synthesis.analysis import h_infinity_norm
 from casadi_gnc.synthesis.answer import LmiAnswer
 from casadi_gnc.synthesis.balancing import balanced
 from casadi_gnc.synthesis.gains import Synthesis, certify_gains, peak_from, plant_rate, starts
 from casadi_gnc.synthesis.lmis import Lmis
+from casadi_gnc.synthesis.performance import performance
 from casadi_gnc.synthesis.recipes.two_steps import two_steps
 from casadi_gnc.synthesis.regions import regions
 from casadi_gnc.synthesis.unknowns import block_matrix
@@ -89,22 +90,11 @@ def state_feedback(
     >>> found.status.name, round(found.promised, 3)
     ('CERTIFIED', 1.02)
     """
-    A, B, E, C, D = matrices(A=A, B=B, E=E, C=C, D=D)
-    n, m, q, p = len(A), B.shape[1], E.shape[1], len(C)
-    (F,) = matrices(F=np.zeros((p, q)) if F is None else F)
-    for name, matrix, rows, columns in (
-        ("A", A, n, n),
-        ("B", B, n, m),
-        ("E", E, n, q),
-        ("C", C, p, n),
-        ("D", D, p, m),
-        ("F", F, p, q),
-    ):
-        fits(name, matrix, rows, columns)
+    plant = performance(A, B, E, C, D, F)
+    A, B, E, C, D, F = plant.A, plant.B, plant.E, plant.C, plant.D, plant.F
+    n, m, q, p = plant.sizes
     vertices, most = starts(vertices, limit, n)
     asked = regions(decay_1_s, damping, disc_rad_s, fastest_rad_s)
-    priced = int(np.linalg.matrix_rank(D))
-    missing = f"z prices {priced} of {m} commands: add rows with the others to D, or give fastest_rad_s."
 
     T = balanced(A, B, E, C, D)
     inverse = np.linalg.inv(T)
@@ -137,7 +127,7 @@ def state_feedback(
             peak=peak_from(A - B @ K, K, vertices, plant_rate(A, B)),
             limit=most,
             parts=(A, -B @ K),
-            missing=missing if priced < m else "Give fastest_rad_s.",
+            missing=plant.missing,
         )
 
-    return two_steps(pose, gains_of, gamma, slack, margin, backend, options, attained=priced == m)
+    return two_steps(pose, gains_of, gamma, slack, margin, backend, options, attained=plant.priced == m)
