@@ -105,6 +105,10 @@ def _print(title: str, found: dict[str, Any]) -> None:
         limit = found["peak"]["limit"]
         asked = "no limit given" if limit is None else f"limit {limit:.4g}"
         typer.echo(f"peak command from the worst start: at most {found['peak']['bound']:.4g}, {asked}")
+    if found.get("saturation"):
+        over = found["saturation"]["command_over_limit"]
+        bound = "whatever the commands" if over is None else f"with commands up to {over:.4g} times their limits"
+        typer.echo(f"saturation: stable {bound}")
     if found.get("stable_ratios"):
         low, high = found["stable_ratios"]
         typer.echo(f"stable for (assumed mass)/(true mass) {_range(low, high)}")

@@ -165,9 +165,7 @@ class Parts:
             self._dimensions = max(self._dimensions, piece.dimensions)
             self._degree = max(self._degree, piece.degree)
             self._used.update(piece.helpers)
-            self._known[piece.text] = self._add(
-                piece.name, piece.inputs, piece.outputs, piece.asks, list(piece.lines)
-            )
+            self._known[piece.text] = self._add(piece.name, piece.inputs, piece.outputs, piece.asks, list(piece.lines))
         return self._known[piece.text]
 
     def _add(

@@ -117,6 +117,9 @@ def synthesize(case: SynthesisCase, backend: Any = None) -> dict[str, Any]:
         data["h2_norm"] = {key: _finite(value) for key, value in told.items()}
     if found.depths:
         data["pole_depths_rad_s"] = dict(found.depths)
+    if np.isfinite(found.share):
+        over = 1 / (1 - found.share) if found.share < 1 else np.inf
+        data["saturation"] = {"share": found.share, "command_over_limit": _finite(over)}
     if found.peak is not None:
         data["peak"] = {
             "value": _finite(found.peak.value),

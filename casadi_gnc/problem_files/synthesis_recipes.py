@@ -7,7 +7,7 @@ what was found with its certificate. A recipe of your own is derived from `Recip
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -145,6 +145,21 @@ class IntermediateObserver(FromStarts):
         return synthesis.intermediate_observer(**self.arguments(), backend=backend)
 
 
+class SaturationMargin(OfPlant):
+    """How far commands of u = -K x may exceed their limits with the loop still proved stable."""
+
+    K: Table = Field(description="the gain that is judged")
+    criterion: Literal["circle", "popov"] = Field(
+        default="popov", description="circle holds for limits that change with time too, popov proves more"
+    )
+    margin: Positive = 1e-7
+    largest: Positive = Field(default=1e4, description="inverse of the smallest share that is sought")
+
+    def run(self, backend: Any) -> Synthesis:
+        """Return the gain with its certificate."""
+        return synthesis.saturation_margin(**self.arguments(), backend=backend)
+
+
 class Theorem1(Recipe):
     """Theorem 1 of Shi et al. (2020) as printed."""
 
@@ -176,6 +191,7 @@ REGISTRY = Registry(
         "observer": f"{__name__}:Observer",
         "input_ellipsoid": f"{__name__}:InputEllipsoid",
         "intermediate_observer": f"{__name__}:IntermediateObserver",
+        "saturation_margin": f"{__name__}:SaturationMargin",
         "shi2020_theorem1": f"{__name__}:Theorem1",
     },
     is_one=lambda thing: isinstance(thing, type) and issubclass(thing, Recipe),

@@ -68,6 +68,7 @@ class Synthesis:
         reached; None where it was not sought.
     energy : the H2 norm and what was promised of it; None if it was not asked.
     depths : by region of poles, how deep the poles lie in it, [rad/s]; negative outside.
+    share : of the command that saturation may take, proved, above 0 and at most 1; NaN if it was not asked.
     """
 
     status: GainStatus
@@ -83,6 +84,7 @@ class Synthesis:
     smallest: tuple[float, float] | None = None
     energy: Energy | None = None
     depths: dict[str, float] = field(default_factory=dict)
+    share: float = float("nan")
 
     @property
     def is_certified(self) -> bool:

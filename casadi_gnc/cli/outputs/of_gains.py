@@ -141,6 +141,16 @@ class Peak(TypedDict):
 
 
 @_TOLD
+class Saturation(TypedDict):
+    """What a loop with saturation is proved to bear."""
+
+    share: float
+    """Of each command, that the limits may take away; 1: all of it."""
+    command_over_limit: float | None
+    """That commands may reach, in their limits; null: any."""
+
+
+@_TOLD
 class Written(TypedDict):
     """Gains that were written into a mission file."""
 
@@ -176,6 +186,7 @@ class Synthesis(TypedDict):
     h2_norm: NotRequired[EnergyNorm]
     pole_depths_rad_s: NotRequired[dict[str, float]]
     """By region of poles that was asked for, how deep the poles lie in it."""
+    saturation: NotRequired[Saturation]
     peak: NotRequired[Peak | None]
     stable_ratios: NotRequired[list[float | None] | None]
     """Range of (assumed mass)/(true mass); null: without an end."""
