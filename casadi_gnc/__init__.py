@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from casadi_gnc.laws import FORCE, FORCE_AND_TORQUE, TORQUE, Law, gain, option
     from casadi_gnc.missions.actuation import Actuation, Actuators
     from casadi_gnc.missions.craft import Craft, EffortKeys
+    from casadi_gnc.missions.fault_handling import FaultHandling
     from casadi_gnc.missions.flight import Flight
     from casadi_gnc.missions.mission import Mission
     from casadi_gnc.missions.panel import Panel
@@ -48,6 +49,7 @@ _HOMES = {
     "EffortKeys": "missions.craft",
     "FORCE": "laws",
     "FORCE_AND_TORQUE": "laws",
+    "FaultHandling": "missions.fault_handling",
     "Flight": "missions.flight",
     "Funnel": "missions.scheme",
     "GncError": "errors",
@@ -94,6 +96,7 @@ __all__ = [
     "Check",
     "Craft",
     "EffortKeys",
+    "FaultHandling",
     "Flight",
     "Funnel",
     "GncError",

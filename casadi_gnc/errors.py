@@ -117,6 +117,14 @@ class RequirementError(GncError):
         super().__init__(message)
 
 
+class FaultHandlingError(FlightError):
+    """Report what a mission cannot do with faults; `key` is the option that the sentence begins with."""
+
+    def __init__(self, key: str, told: str) -> None:
+        self.key = key
+        super().__init__(f"{key} {told}")
+
+
 class SynthesisError(GncError):
     """Report matrix inequalities that cannot be posed, or a gain asked for that is not certified."""
 

@@ -73,6 +73,10 @@ def generate(
     options = Options(mission.name if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target)
     package.check_room(folder, force)
+    if mission.fault_handling is not None and mission.fault_handling.gain_change_s and not tunable:
+        raise PackageError(
+            "gain_change_s needs gains that can change; name them by --tunable, or leave it out of [fault_handling]"
+        )
     controller = describe(mission, scheme, tunable, monitored=True)
     sources, made_of = making.kept(mission, controller, options, fresh=not isinstance(problem, Mission))
     about = {

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import casadi as ca
 
 from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.embedded.monitor import Monitor
 from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.embedded.scalars import Math, Real, c_constant
@@ -84,7 +85,9 @@ class Controller:
     ========  ===========================================================================
     derive    p -> derived                                            (with tunables)
     start     t, y, [e] -> m
-    before    t, y, good, m, actuators, [e] -> accepted, wanted, limited, lower, upper, flags, carried
+    before    t, y, good, m, actuators, [e] -> accepted, wanted, limited, lower, upper, flags, carried;
+              where changed gains fade in also last, offset, share, changed -> shifted: how far the effort is
+              from that of the new gains alone, times `share`
     allocate  limited, actuators, lower, upper, carried, [e] -> allocated   (where it is an expression)
     judge     told, carried, [e] -> verdict
     modulate  told, carried, [e] -> pulses, carry, the last of the memory    (where actuators make pulses)
@@ -105,6 +108,7 @@ class Controller:
     statuses : bit -> (name, sentence), those that a controller can raise.
     carry : how many numbers of the memory, the last ones, pulses carry over.
     monitor : what the package watches on board, or None.
+    faults : what the package does with faults beside telling them, or None.
     notes : tape -> result -> what its elements are, for those who read the C: how many, what.
     """
 
@@ -127,6 +131,7 @@ class Controller:
     tunables: tuple[Tunable, ...] = ()
     allocation: AllocationProblem | None = None
     monitor: Monitor | None = None
+    faults: Faults | None = None
     carry: int = 0
     notes: dict[str, dict[str, tuple[tuple[int, str], ...]]] = field(default_factory=dict)
 
@@ -144,9 +149,10 @@ class Controller:
 
     @property
     def raised(self) -> dict[int, tuple[str, str]]:
-        """Every bit of the status, as `statuses`: those of the controller, and those of misuse."""
+        """Every bit of the status, as `statuses`: those of the controller, of handled faults, and of misuse."""
         unread = {1 << 25: NOT_CONFIGURED} if self.tunables else {}
-        return {**self.statuses, **unread, **MISUSE}
+        handled = {} if self.faults is None else self.faults.statuses
+        return {**self.statuses, **handled, **unread, **MISUSE}
 
     @property
     def outputs(self) -> Layout:

@@ -9,6 +9,7 @@ import numpy as np
 
 from casadi_gnc.allocation import OnlineInFlight
 from casadi_gnc.embedded.controller import Controller
+from casadi_gnc.embedded.fault_machine import HandledFaults
 from casadi_gnc.status import StepStatus
 
 
@@ -25,6 +26,7 @@ class Machine:
         self._good = np.zeros(controller.measured.size)
         self._told = np.zeros(controller.actuators.size)
         self._started = False
+        self._handled = HandledFaults(controller)
         self._watch()
 
     def _run(self, name: str, **ports: Any) -> dict[str, np.ndarray]:
@@ -60,8 +62,9 @@ class Machine:
         if not self._started:
             self._good = y
             self._memory = self._run("start", t=t, y=y)["m"] if self._c.memory.size else self._memory
-        now = self._run("before", t=t, y=y, good=self._good, m=self._memory, actuators=self._told)
-        status = int(now["flags"][0])
+        given = {"t": t, "y": y, "good": self._good, "m": self._memory, "actuators": self._told}
+        now = self._run("before", **given, **self._handled.unfaded)
+        status = int(now["flags"][0]) | self._handled.aged(y, now["accepted"])
         self._started = self._started or not status & StepStatus.MEASUREMENT_REPLACED
         box = {"lower": now["lower"], "upper": now["upper"]}
         report = np.zeros(0)
@@ -71,11 +74,14 @@ class Machine:
         else:
             ports = {"limited": now["limited"], "actuators": self._told, "carried": now["carried"]}
             told = self._run("allocate", **ports, **box)["allocated"]
+        told, raised = self._handled.guarded(status, np.array(told), self._told, *box.values())
+        status |= raised
         status |= int(self._run("judge", told=told, carried=now["carried"])["verdict"][0])
         self._good, self._told, carry = now["accepted"], np.array(told), np.zeros(0)
         if "modulate" in self._c.tapes:
             told, carry = self._run("modulate", told=told, carried=now["carried"]).values()
         self._memory = np.append(self._run("after", told=told, carried=now["carried"])["memory"], carry)
+        status |= self._handled.noted(status)
         given = {"t": t, "y": now["accepted"], "actuators": told, "report": report, "status": status}
         seen = self._watched(**given, wanted=now["wanted"], limited=now["limited"])
         return np.concatenate([told, now["wanted"], now["limited"], report, seen, [status]])

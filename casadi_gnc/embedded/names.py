@@ -10,7 +10,7 @@ from casadi_gnc.errors import PackageError
 #: Longest name that is taken; longer ones are appended to it.
 LONGEST = 31
 #: Members that the parameters of a package, or a table of them, have beside its tunable gains.
-_MEMBERS = ("derived", "configured", "allocation", "checksum")
+_MEMBERS = ("derived", "configured", "allocation", "checksum", "changes")
 
 
 def check_name(name: str, what: str = "name") -> str:

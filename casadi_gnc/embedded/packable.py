@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from casadi_gnc.embedded import flight_function, function_source, package
+from casadi_gnc.embedded import fault_source, flight_function, function_source, package
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry, bits, calls, entries
 from casadi_gnc.embedded.flight_function import FlightFunction
@@ -70,15 +70,6 @@ class Packable(Protocol):
         ...
 
 
-#: What every state ends with.
-_COUNTERS = (
-    Entry("last_time", "last_time", 1, "real", "s", "of the last step"),
-    Entry("started", "started", 1, "uint32", "", "0 until the first good measurement"),
-    Entry("stepped", "stepped", 1, "uint32", "", "0 until the first step"),
-    Entry("ready", "ready", 1, "uint32", "", "a pattern once it is reset"),
-)
-
-
 def _real(options: Options) -> str:
     return {"double": "float64", "float": "float32"}[options.real]
 
@@ -118,13 +109,11 @@ class PackableController:
     def dictionary(self, options: Options) -> Dictionary:
         """Return what the package says of its numbers."""
         own = self.own
-        state = [*entries(own.memory, "memory."), *entries(own.measured, "good.", "last good measurement")]
-        state += entries(own.actuators, "previous.", "last command")
         return Dictionary(
             options.name, own.title, own.scheme, _real(options), own.period, calls(options.name), ("state", "params"),
             (Entry("time", "time", 1, "real", "s", "since the start of the mission"), *entries(own.measured)),
             (*entries(own.outputs), STATUS),
-            (*state, *_COUNTERS),
+            tuple(fault_source.state(own)),
             tuple(
                 Entry(
                     one.name, one.name, len(one.default), "real", one.unit, one.note,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.embedded.members import members, output_members, tunable_members
 from casadi_gnc.system.templates import template
 
@@ -34,6 +35,7 @@ def render_readme(
     measured : a row a target; may be empty.
     sizes : bytes of state and parameters on this machine.
     """
+    faults = controller.faults
     rows, monitor = tunable_members(controller), controller.monitor
     for row, one in zip(rows, controller.tunables, strict=True):
         row["default"] = ", ".join(f"{value:g}" for value in one.default)
@@ -53,6 +55,9 @@ def render_readme(
         outputs=output_members(controller),
         statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.raised.items()],
         tunables=rows,
+        faults=faults if faults is not None and faults != Faults(faults.failures) else None,
+        failures=[name for bit, (name, _) in controller.raised.items() if faults is not None and bit & faults.failures],
+        safe=_safe(faults),
         watched=[
             {"name": one.name, "id": one.id, "asked": one.asked, "unit": one.unit or "-", "delay": f"{one.delay:g}"}
             for one in (monitor.watched if monitor is not None else ())
@@ -61,3 +66,12 @@ def render_readme(
         measured=measured,
         host={"state": sizes[0], "params": sizes[1]},
     )  # fmt: skip
+
+
+def _safe(faults: Faults | None) -> str:
+    """Return in words what the actuators are told in safe mode."""
+    if faults is None or faults.safe is None:
+        return ""
+    if not faults.safe:
+        return "what they were told last"
+    return ", ".join(f"{value:g}" for value in faults.safe) if any(faults.safe) else "zero"

@@ -16,6 +16,7 @@ import numpy as np
 
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded.controller import Controller, Tunable
+from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.embedded.monitor import Monitor, Watched
 from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout, Signal
@@ -41,6 +42,8 @@ def to_text(controller: Controller) -> str:
         kept = {"watched": [asdict(one) for one in own.watched], "tape": own.tape.serialize(), "horizon": own.horizon}
         content["monitor"] = {**kept, "left_out": own.left_out, "lines": own.lines, "initial": own.initial}
         content["monitor"] |= {"finish": own.finish}
+    if controller.faults is not None:
+        content["faults"] = asdict(controller.faults)
     content["allocation"] = None if controller.allocation is None else _problem(controller.allocation)
     return json.dumps({"format": _FORMAT, "casadi": metadata.version("casadi"), **content}, indent=1) + "\n"
 
@@ -62,6 +65,7 @@ def from_text(text: str) -> Controller:
             for tape, ports in content.get("notes", {}).items()
         }
         given["monitor"] = _monitor_of(content["monitor"]) if "monitor" in content else None
+        given["faults"] = _faults_of(content["faults"]) if "faults" in content else None
         given["allocation"] = None if content["allocation"] is None else _problem_of(content["allocation"])
     except (ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PackageError(f"the controller cannot be read: {type(error).__name__}: {str(error)[:200]}") from error
@@ -78,6 +82,12 @@ def _monitor_of(content: dict[str, Any]) -> Monitor:
         horizon=int(content["horizon"]),
         finish=int(content["finish"]),
     )
+
+
+def _faults_of(content: dict[str, Any]) -> Faults:
+    safe = content["safe"]
+    ages = tuple((str(name), int(most)) for name, most in content["ages"])
+    return Faults(**{**content, "ages": ages, "safe": None if safe is None else tuple(float(v) for v in safe)})
 
 
 def _number(value: float) -> float | str:

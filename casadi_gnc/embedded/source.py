@@ -8,6 +8,7 @@ from typing import Any
 
 from casadi_gnc.allocation import online
 from casadi_gnc.allocation.problem import AllocationProblem
+from casadi_gnc.embedded import fault_source
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.members import (
     access,
@@ -72,6 +73,8 @@ def render_header(controller: Controller, options: Options) -> str:
         tunables=tunable_members(controller),
         derived=_derived(controller),
         allocation=_sizes(controller),
+        faults=controller.faults,
+        handled={**fault_source.header(controller), "image": fault_source.image(controller, options.real)},
     )  # fmt: skip
 
 
@@ -91,12 +94,14 @@ def render_source(controller: Controller, options: Options) -> str:
         text, call = _print(name, controller, options)
         tapes.append({"text": text, "note": _NOTES[name]})
         calls[name] = call
+    faults = controller.faults
     reads = controller.allocation is not None or any("params" in call for call in calls.values())
     return template("package_source.c.j2").render(
         **_common(controller, options),
         maths=options.maths,
         period=options.constant(controller.period),
         zero=options.constant(0.0),
+        one=options.constant(1.0),
         half=options.constant(0.5),
         rounding=options.constant(4.0 * 2.0 ** (-23 if options.real == "float" else -52)),
         largest=options.constant(1e30),
@@ -109,7 +114,10 @@ def render_source(controller: Controller, options: Options) -> str:
         },
         tapes=tapes,
         calls=calls,
-        reads_params=reads,
+        reads_params=reads or bool(faults and faults.fade),
+        faults=fault_source.source(controller, options),
+        guards=faults is not None and faults.safe is not None,
+        notes=faults is not None and (faults.count or faults.latch or faults.safe is not None),
         tunables=controller.tunables,
         tunable_places=[place for one in controller.tunables for place in access_tunable(one, "")],
         checks=_checks(controller, options),
@@ -192,6 +200,11 @@ def _places(name: str, controller: Controller) -> dict[str, list[str]]:
         "allocated": elements("now->actuators", count),
         "flags": ["now->flags"],
         "verdict": ["now->verdict"],
+        "last": elements("state->fading.last", n) if n > 1 else ["state->fading.last"],
+        "offset": elements("state->fading.offset", n) if n > 1 else ["state->fading.offset"],
+        "share": ["now->share"],
+        "changed": ["now->changed"],
+        "shifted": elements("now->shifted", n),
     }
 
 
@@ -239,6 +252,10 @@ def _copies(controller: Controller) -> dict[str, list[str]]:
     results += _copy(access(controller.actuators, "output->"), told)
     results += _copy(access(controller.wanted, "output->"), elements("now.wanted", efforts))
     results += _copy(access(controller.limited, "output->"), elements("now.limited", efforts))
+    if controller.faults is not None and controller.faults.fade:
+        places = _places("before", controller)
+        results += _copy(places["last"], elements("now.limited", efforts))
+        results += _copy(places["offset"], elements("now.shifted", efforts))
     previous = _copy(elements("now.previous", count), access(controller.actuators, "state->previous."))
     return {"results": results, "previous": previous, "asked": asked if controller.carry else []}
 

@@ -14,6 +14,7 @@ from casadi_gnc.errors import FlightError, RequirementError, offer
 from casadi_gnc.laws import Law
 from casadi_gnc.missions import asking
 from casadi_gnc.missions.craft import Craft
+from casadi_gnc.missions.fault_handling import FaultHandling
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.plant import Plant
 from casadi_gnc.missions.recording import row_of
@@ -165,6 +166,14 @@ def refuse_requirement(mission: Mission, asked: Requirement) -> None:
             asked.bind(row, row.symbol("row"), mission.timing.sample_period)
         except RequirementError as error:
             raise RequirementError(f"{error} (scheme {scheme.name})", error.key) from None
+
+
+def refuse_fault_handling(mission: Mission, asked: FaultHandling | None) -> None:
+    """Raise `FaultHandlingError` where what is asked for does not fit a scheme."""
+    for scheme in mission.schemes if asked is not None else ():
+        assert asked is not None
+        raised = Loop(mission, scheme).raised()
+        asked.faults(scheme, mission.truth.measurement, raised, mission.timing.sample_period)
 
 
 def complete(mission: Mission, metric: Metric) -> Metric:

@@ -21,6 +21,7 @@ from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions import fitting, functions, probing
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.describing import on_one_screen
+from casadi_gnc.missions.fault_handling import FaultHandling
 from casadi_gnc.missions.linear_plant import LinearPlant, linear_plant
 from casadi_gnc.missions.origin import Origin, keys_of_timing
 from casadi_gnc.missions.parts import Parts
@@ -57,6 +58,7 @@ class Mission:
     checks : functions (mission, scheme) that yield further checks of this mission.
     parts : of the craft, where it has been asked for them.
     dispersions : what differs from case to case of a campaign (`casadi_gnc.campaigns.cases.Dispersion`).
+    fault_handling : what flight packages do with faults beside telling them.
     origin : the file that it was read from, if it was; `dataclasses.replace`, which may change anything, forgets it.
 
     Raises
@@ -87,6 +89,7 @@ class Mission:
     checks: Sequence[Callable[[Mission, Scheme], Iterable[Check]]] = ()
     requirements: Sequence[Requirement] = ()
     dispersions: Sequence[Any] = ()
+    fault_handling: FaultHandling | None = None
     parts: InitVar[Parts | None] = None
     origin: Origin | None = field(default=None, init=False)
 
@@ -102,6 +105,7 @@ class Mission:
         object.__setattr__(self, "metrics", tuple(fitting.complete(self, metric) for metric in self.metrics))
         object.__setattr__(self, "requirements", tuple(self.requirements))
         fitting.refuse_requirements(self)
+        fitting.refuse_fault_handling(self, self.fault_handling)
 
     @cached_property
     def parts_asked(self) -> Parts:
@@ -189,6 +193,11 @@ class Mission:
     def held_to(self, requirements: Sequence[Requirement]) -> Mission:
         """Note the requirements, looked at, of a mission that was just made, and return the mission."""
         object.__setattr__(self, "requirements", tuple(requirements))
+        return self
+
+    def handling(self, faults: FaultHandling) -> Mission:
+        """Note what packages of a mission that was just made do with faults, looked at, and return the mission."""
+        object.__setattr__(self, "fault_handling", faults)
         return self
 
     def read_from(self, origin: Origin | None) -> Mission:
@@ -304,6 +313,7 @@ def _digest(mission: Mission) -> str:
     told = [f"{type(mission.craft).__qualname__} {mission.craft.model_dump_json()}", repr(mission.timing)]
     told += [repr(each) for each in (mission.noise, *mission.metrics, *mission.funnels, dict(mission.start_from))]
     told += [repr(each) for each in mission.requirements]
+    told += [] if mission.fault_handling is None else [repr(mission.fault_handling)]
     for scheme in mission.schemes:
         told.append(f"{scheme.name} {scheme.law!r} {scheme.actuation!r} {scheme.feedback}")
         told += [] if scheme.navigation is None else [repr(scheme.navigation)]

@@ -10,6 +10,7 @@ and computed once, when they change.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import casadi as ca
@@ -17,13 +18,17 @@ import numpy as np
 
 from casadi_gnc.allocation import OnlineInFlight
 from casadi_gnc.embedded.controller import Controller, Tunable
+from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.errors import PackageError, offer
 from casadi_gnc.laws import gains_of
+from casadi_gnc.mathematics import bounds
+from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.loop import Loop
+from casadi_gnc.missions.loop import CREDIBLE, Loop
 from casadi_gnc.missions.onboard_monitor import monitor_of
 from casadi_gnc.missions.onboard_notes import notes
 from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.status import StepStatus
 
 if TYPE_CHECKING:
     from casadi_gnc.missions.mission import Mission
@@ -64,6 +69,8 @@ def describe(
         mission = mission.with_scheme(chosen.name, **values)
         chosen = mission.scheme(chosen.name)
     actuation, truth = chosen.actuation, mission.truth
+    raised = Loop(mission, chosen).raised()
+    faults = _faults(mission, chosen, raised, fades=bool(parameters))
     return Controller(
         title=mission.title or mission.name,
         source=mission.source,
@@ -80,8 +87,9 @@ def describe(
         upper=tuple(float(value) for value in actuation.upper),
         least=tuple(float(value) for value in actuation.limit_below),
         most=tuple(float(value) for value in actuation.limit_above),
-        tapes=_tapes(Loop(mission, chosen), symbols),
-        statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in Loop(mission, chosen).raised()},
+        tapes=_tapes(Loop(mission, chosen), symbols, fades=faults is not None and faults.fade > 0),
+        faults=faults,
+        statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in raised},
         tunables=tuple(parameters),
         allocation=allocator.problem if isinstance(allocator, OnlineInFlight) else None,
         notes=notes(Loop(mission, chosen)),
@@ -105,7 +113,15 @@ def _parameter(scheme: Scheme, name: str) -> Tunable:
     )
 
 
-def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
+def _faults(mission: Mission, scheme: Scheme, raised: Sequence[StepStatus], *, fades: bool) -> Faults | None:
+    """Return what the package does with faults; new gains fade in where there are gains to be changed."""
+    if mission.fault_handling is None:
+        return None
+    found = mission.fault_handling.faults(scheme, mission.truth.measurement, raised, mission.timing.sample_period)
+    return found if fades else replace(found, fade=0)
+
+
+def _tapes(loop: Loop, parameters: list[ca.SX], *, fades: bool) -> dict[str, ca.Function]:
     """Return the tapes of the controller.
 
     What allocate, judge and after need that does not depend on the new actuators is computed in
@@ -113,6 +129,9 @@ def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
     """
     s = loop.symbols()
     first = loop.before(s.t, s.y, s.good, s.m, s.actuators)
+    inputs = s.ports("t", "y", "good", "m", "actuators")
+    if fades:
+        inputs |= _fading(loop, first)
     y, limited = first["accepted"], first["limited"]
     told = loop.plant.inputs.symbol("told")
     pulses, kept = loop.modulated(told, first["memory"])
@@ -122,8 +141,8 @@ def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
     # What pulses carry over is known from then on, and the last of the memory.
     memory = loop.remembered(s.t, y, first["memory"], first["wanted"], limited, told)
     late["after"] = {"memory": memory[: memory.shape[0] - carried_over(loop.scheme)]}
-    inputs = s.ports("t", "y", "good", "m", "actuators")
-    now = {key: first[key] for key in ("accepted", "wanted", "limited", "lower", "upper", "flags")}
+    early = ("accepted", "wanted", "limited", "lower", "upper", "flags", "shifted")
+    now = {key: first[key] for key in early if key in first}
     made: _Made = {"start": (s.ports("t", "y"), {"m": loop.started(s.t, s.y)}), "before": (inputs, now)}
     if loop.actuation.is_symbolic:
         allocated = loop.allocated(y, s.limited, s.actuators, s.lower, s.upper)
@@ -134,6 +153,22 @@ def _tapes(loop: Loop, parameters: list[ca.SX]) -> dict[str, ca.Function]:
     for name, (ports, outputs) in made.items():
         functions[name] = tapes.function(name, {**ports, **e}, outputs)
     return functions
+
+
+def _fading(loop: Loop, first: dict[str, Any]) -> dict[str, ca.SX]:
+    """Let the limited effort of a sample move from that of the old gains to that of the new ones; return the ports.
+
+    Where the gains were changed (`changed` is 1), `shifted` is the last effort less the one that the new gains ask for;
+    `share` of it is added, from 1 to 0, and the sum kept inside the limits.
+    """
+    rows = loop.actuation.effort.size
+    ports = {"last": ca.SX.sym("last", rows), "offset": ca.SX.sym("offset", rows)}
+    ports |= {"share": ca.SX.sym("share"), "changed": ca.SX.sym("changed")}
+    shifted = ca.if_else(ports["changed"] > 0.5, ports["last"] - first["limited"], ports["offset"])
+    first["shifted"] = ca.if_else(ca.fabs(shifted) <= CREDIBLE, shifted, 0.0)
+    below, above = array(loop.actuation.limit_below), array(loop.actuation.limit_above)
+    first["limited"] = bounds.clip(first["limited"] + ports["share"] * first["shifted"], below, above)
+    return ports
 
 
 def carried_over(scheme: Scheme) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 
 from casadi_gnc.campaigns.dispersions import DispersionTable
-from casadi_gnc.errors import FlightError, GncError, LawError, ProblemError, RequirementError, offer
+from casadi_gnc.errors import FaultHandlingError, FlightError, GncError, LawError, ProblemError, RequirementError, offer
 from casadi_gnc.laws import Law, PerformanceFunnel, gains_of
 from casadi_gnc.missions import fitting
 from casadi_gnc.missions.actuation import Actuation
@@ -99,6 +99,12 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
             complaints.add(("requirement", i, *filter(None, [error.key])), str(error))
     complaints.settle()
     _look_at_dispersions(made, common.dispersion, complaints)
+    if common.fault_handling is not None:
+        try:
+            fitting.refuse_fault_handling(made, common.fault_handling.handling())
+        except FaultHandlingError as error:
+            complaints.add(("fault_handling", error.key), str(error))
+        made = made.handling(common.fault_handling.handling())
     complaints.settle()
     return made.held_to([table.requirement() for table in common.requirement])
 

@@ -10,7 +10,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, field_validator, model_validator
 
 from casadi_gnc.campaigns.dispersions import DispersionTable
-from casadi_gnc.errors import RequirementError
+from casadi_gnc.errors import FaultHandlingError, RequirementError
+from casadi_gnc.missions.fault_handling import FaultHandling
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.requirements.requirement import ID
 from casadi_gnc.missions.scheme import MetricKind
@@ -163,6 +164,45 @@ class SweepTable(Part):
     show: str = Field(description="a metric, or a status such as FUNNEL_LEFT, of which the first time is shown")
 
 
+class FaultHandlingTable(Part):
+    """What flight packages do with faults beside telling them; what is left out is off."""
+
+    failures: Annotated[list[str], Field(min_length=1)] = Field(
+        default=[],
+        description="bits of the status that make a failure; all but those of limits and certificates if left out",
+    )
+    count: bool = Field(default=False, description="steps, replaced measurements, steps in a row with each bit")
+    latch_first: bool = Field(default=False, description="keep the first failure until it is acknowledged")
+    measurement_age_s: Positive | dict[str, Positive] | None = Field(
+        default=None, description="how long a measurement may be held, one for all or by signal"
+    )
+    safe_output: Literal["zero", "hold"] | list[float] | None = Field(
+        default=None, description="what the actuators are told in safe mode, in words or a number each"
+    )
+    safe_after: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="failures in a row that begin safe mode"
+    )
+    release_after: Annotated[int, Field(ge=1)] | None = Field(
+        default=None, description="steps without failure that end it; only an acknowledgement if left out"
+    )
+    gain_change_s: Positive | None = Field(
+        default=None, description="the effort moves so long from that of old gains to that of new ones"
+    )
+    state_image: bool = Field(default=False, description="the state can be exported as octets and imported")
+
+    @model_validator(mode="after")
+    def _fit(self) -> FaultHandlingTable:
+        try:
+            self.handling()
+        except FaultHandlingError as error:
+            raise MisfitError(str(error), error.key) from None
+        return self
+
+    def handling(self) -> FaultHandling:
+        """Return what the table says."""
+        return FaultHandling(**self.model_dump(exclude_none=True))
+
+
 class MissionTables(Part):
     """What every mission file has besides the craft's tables and the schemes."""
 
@@ -177,6 +217,9 @@ class MissionTables(Part):
     requirement: list[RequirementTable] = []
     sweep: list[SweepTable] = []
     dispersion: list[DispersionTable] = Field(default=[], description="what differs from case to case of a campaign")
+    fault_handling: FaultHandlingTable | None = Field(
+        default=None, description="what flight packages do with faults beside telling them"
+    )
     checks: list[str] = Field(default=[], description='further checks: names, or "./file.py:function"')
 
     @field_validator("funnel", mode="before")

@@ -17,6 +17,7 @@ from casadi_gnc.delivery.verifying import read_vectors, verify
 from casadi_gnc.embedded import packets
 from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry
 from casadi_gnc.errors import PackageError
+from casadi_gnc.problem_files.loading import load
 
 PROGRAM = r"""
 #include <stdio.h>
@@ -85,7 +86,8 @@ def test_another_reader_finds_the_words(real, tmp_path):
 
     folder = tmp_path / "sat"
     gains = {"scheme": "funnel_robust", "tunable": ("rate_gain",)}
-    generate("huang2020/slew", folder, name="sat", steps=64, frame="xtce", real=real, **gains)
+    mission = load("huang2020/slew", {"fault_handling.count": True, "fault_handling.latch_first": True})
+    generate(mission, folder, name="sat", steps=64, frame="xtce", real=real, **gains)
     definition = folder / "xtce" / "sat.xml"
     assert space_packet_parser.validate_xtce(definition).valid
     (tmp_path / "main.c").write_text(PROGRAM)
@@ -123,6 +125,13 @@ def test_another_reader_finds_the_words(real, tmp_path):
     assert [one["place"] for one in good] == ["good.mrp", "good.rate"]
     assert words(found[2], "state", good) == inputs[0, 1:].tolist()  # the first measurement was good
     assert int(found[2]["state__started"]) == 1
+    assert [int(one["state__health__samples"]) for one in found[2::4]] == list(range(1, 65))
+    replaced = (outputs[:, -1] & 1).astype(int)
+    assert [int(one["state__health__replaced"]) for one in found[2::4]] == np.cumsum(replaced).tolist()
+    first = int(found[-2]["state__failure__sample"])
+    assert outputs[first - 1, -1] & 1
+    latched = [bool(one["status__FAILURE_LATCHED"]) for one in found[1::4]]
+    assert latched == [k + 1 >= first for k in range(64)]
     assert float(found[3]["params__rate_gain"]) == pytest.approx(about["parameters"][0]["default"][0])
     assert verify(folder)["is_sound"]
 
