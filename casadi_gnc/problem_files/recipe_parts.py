@@ -132,6 +132,29 @@ def one_of_starts(part: Any) -> Any:
     return part
 
 
+def vertices_of(data: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
+    """Return the keys of a recipe of several plants, with A and B, a matrix each, from the missions that it names."""
+    told, named = [key for key in ("A", "B") if data.get(key) is not None], data.get("missions")
+    if named is None:
+        if len(told) < 2:
+            raise MisfitError("is missing; give A and B, or missions", "A" if told != ["A"] else "B")
+        if data.get("scheme") is not None:
+            raise MisfitError("names one of the missions that the key missions names; give that too", "scheme")
+        return data
+    if told:
+        raise MisfitError(
+            f"is given beside {told[0]}; the plants come from one of them, leave the other out", "missions"
+        )
+    if not isinstance(named, list) or not named or not all(isinstance(one, str) for one in named):
+        return data  # what is wrong with it is told by its type
+    folder = (info.context or {}).get("folder", Path())
+    try:
+        plants = [_linearised({**data, "mission": one}, folder) for one in named]
+    except MisfitError as error:
+        raise MisfitError(str(error), *("missions" if part == "mission" else part for part in error.path)) from None
+    return {**data, **{key: [plant[key] for plant in plants] for key in ("A", "B") if plants[0]}}
+
+
 def _linearised(data: dict[str, Any], folder: Path) -> dict[str, Any]:
     """Return A and B of the mission that a recipe names, linearised."""
     from casadi_gnc.problem_files.loading import load
@@ -164,9 +187,5 @@ def _is_row(annotation: Any) -> bool:
 
 
 def _is_matrix(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and not _holds_labels(value)
-
-
-def _holds_labels(rows: list[list[Any]]) -> bool:
-    """Return whether rows are of whole numbers and names, and no matrix."""
-    return all(isinstance(entry, (int, str)) for row in rows for entry in row)
+    """Return whether a value is rows of numbers, not of labels, nor a list of matrices."""
+    return isinstance(value, list) and bool(value) and isinstance(value[0], list) and isinstance(value[0][0], float)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 
 from casadi_gnc import synthesis
 from casadi_gnc.problem_files.recipe_parts import (
@@ -23,6 +23,7 @@ from casadi_gnc.problem_files.recipe_parts import (
     Recipe,
     Structure,
     one_of_starts,
+    vertices_of,
 )
 from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis import LmiAnswer, Synthesis
@@ -88,6 +89,39 @@ class OutputFeedback(FromStarts, InRegion):
         """Return the gains with their certificate."""
         given = self.arguments()
         return synthesis.output_feedback(**{"E": given["B"], **given}, backend=backend)
+
+
+class PolytopeStateFeedback(InRegion):
+    """u = -K x for every plant between some others, by one gain or one that follows the plant."""
+
+    A: list[Table] | None = Field(default=None, description="a matrix for each vertex; or give missions")
+    B: list[Table] | None = Field(default=None, description="as many, or one for all; or give missions")
+    missions: Annotated[list[str], Field(min_length=1)] | None = Field(
+        default=None, description="files or shipped names, whose plants are the vertices"
+    )
+    scheme: str | None = Field(
+        default=None, description="of those missions, whose efforts u are; the first if left out"
+    )
+    at_s: NonNegative = Field(default=0.0, description="time at which those plants are linearised")
+    E: Table | None = Field(default=None, description="of the disturbance; the first B if left out")
+    C: Table
+    D: Table
+    F: Table | None = None
+    scheduled: bool = Field(default=False, description="whether the gain follows the plant: one for each vertex")
+    dependent: bool = Field(default=False, description="whether each vertex has a Lyapunov matrix of its own")
+    gamma: Positive | None = Field(default=None, description="bound on the norm; the smallest, and slack, if left out")
+    slack: Positive = 0.02
+    margin: Positive = 1e-7
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_missions(cls, data: Any, info: ValidationInfo) -> Any:
+        return vertices_of(data, info) if isinstance(data, dict) else data
+
+    def run(self, backend: Any) -> Synthesis:
+        """Return the gains with their certificate."""
+        given = {key: value for key, value in self.arguments().items() if key not in ("missions", "scheme", "at_s")}
+        return synthesis.polytope_state_feedback(**{"E": given["B"][0], **given}, backend=backend)
 
 
 class Observer(InRegion):
@@ -188,6 +222,7 @@ REGISTRY = Registry(
         "state_feedback": f"{__name__}:StateFeedback",
         "mixed_state_feedback": f"{__name__}:MixedStateFeedback",
         "output_feedback": f"{__name__}:OutputFeedback",
+        "polytope_state_feedback": f"{__name__}:PolytopeStateFeedback",
         "observer": f"{__name__}:Observer",
         "input_ellipsoid": f"{__name__}:InputEllipsoid",
         "intermediate_observer": f"{__name__}:IntermediateObserver",

@@ -26,6 +26,7 @@ from casadi_gnc.synthesis.recipes.intermediate_observer import intermediate_obse
 from casadi_gnc.synthesis.recipes.mixed_state_feedback import mixed_state_feedback
 from casadi_gnc.synthesis.recipes.observer import observer
 from casadi_gnc.synthesis.recipes.output_feedback import output_feedback
+from casadi_gnc.synthesis.recipes.polytope_state_feedback import polytope_state_feedback
 from casadi_gnc.synthesis.recipes.saturation_margin import saturation_margin
 from casadi_gnc.synthesis.recipes.state_feedback import state_feedback
 from casadi_gnc.synthesis.structured import MuBounds, Uncertainty, mu_bounds, mu_of_loop
@@ -58,6 +59,7 @@ __all__ = [
     "output_feedback",
     "peak_command",
     "poles",
+    "polytope_state_feedback",
     "sample_s",
     "saturation_margin",
     "stable_ratios",

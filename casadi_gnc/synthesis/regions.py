@@ -18,7 +18,7 @@ Regions are met together by one X, which for several is sufficient, not necessar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
@@ -46,6 +46,10 @@ class Region:
         """State that the eigenvalues of A lie in the region, for X > 0 and A X = moved, or X A = moved for the dual."""
         stated = ca.kron(ca.DM(self.L), X) + ca.kron(ca.DM(self.M), moved) + ca.kron(ca.DM(self.M.T), moved.T)
         lmis.nsd(stated, margin=margin, name=self.name)
+
+    def at(self, where: str) -> Region:
+        """Return the region with a name that says for which of several plants it is stated."""
+        return replace(self, name=f"{self.name}, {where}")
 
     def depth(self, pole: complex) -> float:
         """Return how deep a pole lies in the region: positive inside, in the unit of the poles."""
