@@ -26,6 +26,7 @@ STATUSES = {
     4: ("HEALTH_REFUSED", "a health is unknown, or the force of a stuck actuator is not finite: it counts as dead"),
     8: ("NOT_INITIALISED", "parameters or state were not initialised, or are damaged: the forces are zero"),
     16: ("STATE_DAMAGED", "the state was changed between two steps, as its checksum shows: the forces are zero"),
+    32: ("NOT_CONFIGURED", "the parameters are the file's, and this build asks for others: the forces are zero"),
 }
 #: Largest magnitude of a command: the squares of larger ones are no numbers, as in `casadi_gnc.allocation.allocator`.
 MOST = {"double": LARGEST, "float": 1e15}

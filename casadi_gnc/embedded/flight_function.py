@@ -25,6 +25,8 @@ STATUSES = {
     8: ("NOT_INITIALISED", "the state was not initialised, or is damaged: outputs are zero"),
     16: ("STATE_DAMAGED", "the state was changed between two steps, as its checksum shows: outputs are zero"),
 }
+#: The bit beside them of functions with a period and a time.
+_TIME_SHIFTED = ("TIME_SHIFTED", "the time did not advance by the period; the step was taken all the same")
 #: What may be said of a port.
 _SAID = ("unit", "note", "initial")
 
@@ -83,6 +85,16 @@ class FlightFunction:
         """What a step gives."""
         names = [name for name in self.function.name_out() if name not in self.pairs.values()]
         return self._layout(names, self.function.numel_out)
+
+    @property
+    def is_clocked(self) -> bool:
+        """Whether there are a period and an input that is the time [s], called so."""
+        return self.period > 0.0 and "time" in self.inputs and self.inputs.signal("time").size == 1
+
+    @property
+    def statuses(self) -> dict[int, tuple[str, str]]:
+        """What the status of a step can say, by bit."""
+        return {**STATUSES, 32: _TIME_SHIFTED} if self.is_clocked else STATUSES
 
     @property
     def replayed(self) -> Layout:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from casadi_gnc.embedded.controller import Options
-from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction, to_text
+from casadi_gnc.embedded.flight_function import FlightFunction, to_text
 from casadi_gnc.embedded.manifest import digest
 from casadi_gnc.embedded.members import access, declaration
 from casadi_gnc.embedded.parts import Parts
+from casadi_gnc.embedded.source import numbers
 from casadi_gnc.signals import Layout
 from casadi_gnc.system import assets
 from casadi_gnc.system.templates import template
@@ -61,7 +62,9 @@ def common(own: FlightFunction, options: Options) -> dict[str, Any]:
         "inputs": _members(own, own.inputs),
         "state": _members(own, own.state),
         "outputs": _members(own, own.outputs),
-        "statuses": [{"value": b, "name": n, "sentence": s} for b, (n, s) in STATUSES.items()],
+        "clocked": own.is_clocked,
+        "numbers": numbers(options, own.period),
+        "statuses": [{"value": b, "name": n, "sentence": s} for b, (n, s) in own.statuses.items()],
     }
 
 

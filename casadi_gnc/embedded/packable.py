@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from casadi_gnc.embedded import fault_source, flight_function, function_source, package
+from casadi_gnc.embedded import fault_source, function_source, package
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry, bits, calls, entries
 from casadi_gnc.embedded.flight_function import FlightFunction
@@ -176,7 +176,7 @@ class PackableFunction:
             name, own.title, "", _real(options), own.period, texts, ("state",),
             tuple(said(own.inputs)), (*said(own.outputs), STATUS),
             (*said(own.state, "memory."), Entry("ready", "ready", 1, "uint32", "", "a pattern once it is initialised")),
-            (), bits(flight_function.STATUSES),
+            (), bits(own.statuses),
         )  # fmt: skip
 
     def replay_header(self, options: Options, steps: int) -> str:

@@ -99,12 +99,7 @@ def render_source(controller: Controller, options: Options) -> str:
     return template("package_source.c.j2").render(
         **_common(controller, options),
         maths=options.maths,
-        period=options.constant(controller.period),
-        zero=options.constant(0.0),
-        one=options.constant(1.0),
-        half=options.constant(0.5),
-        rounding=options.constant(4.0 * 2.0 ** (-23 if options.real == "float" else -52)),
-        largest=options.constant(1e30),
+        numbers=numbers(options, controller.period),
         count={
             "measured": controller.measured.size,
             "memory": controller.memory.size,
@@ -126,6 +121,13 @@ def render_source(controller: Controller, options: Options) -> str:
         copies=_copies(controller),
         allocation=problem_tables(controller.allocation, options) if controller.allocation is not None else None,
     )  # fmt: skip
+
+
+def numbers(options: Options, period: float) -> dict[str, str]:
+    """Return the numbers that checks of time are written with; `rounding` is of a time, 4 units in the last place."""
+    values = {"zero": 0.0, "one": 1.0, "half": 0.5, "largest": 1e30, "period": period}
+    values["rounding"] = 4.0 * 2.0 ** (-23 if options.real == "float" else -52)
+    return {name: options.constant(value) for name, value in values.items()}
 
 
 def allocator_files(controller: Controller, options: Options) -> dict[str, str]:

@@ -112,6 +112,9 @@ int main(void)
     wrong |= (eight_init(&params) != 0) << 1;
     wrong |= (eight_step(&state, &params, &input, &output) != EIGHT_NOT_INITIALISED) << 2;
     eight_reset(&state, &params);
+    if (eight_step(&state, &params, &input, &output) != EIGHT_NOT_CONFIGURED || output.force[0] != 0.0) return 96;
+    if (eight_configure(&params) != 0) return 95;
+    eight_reset(&state, &params);
     wrong |= (eight_step(&state, &params, &input, &output) != 0) << 3;
     params.problem.m1[3] = -1.0; /* refused: what is used stays */
     wrong |= (eight_configure(&params) != 1) << 4;
@@ -143,6 +146,7 @@ def test_changed_data_are_taken_or_refused_as_a_whole_and_misuse_is_told(package
         "gcc",
         *C99,
         "-DEIGHT_CHECK_STATE=1",
+        "-DEIGHT_CONFIGURE_FIRST=1",
         f"-I{package}",
         tmp_path / "changed.c",
         *units(package),

@@ -11,6 +11,10 @@ import pytest
 from packages import C99, STRICT, made_in_surroundings, needs_target, run, units
 
 import casadi_gnc as gnc
+from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.flight_function import flight_function
+from casadi_gnc.embedded.function_source import function_files
+from casadi_gnc.embedded.package import put
 from casadi_gnc.errors import GncError
 
 PORTS = {"i": {"unit": "N m s", "initial": [0.25, -0.5]}, "x": {"unit": "rad", "note": "error of attitude"}}
@@ -128,6 +132,47 @@ def test_misuse_is_told_and_gives_safe_outputs(package, tmp_path):
     )
     assert build.returncode == 0, build.stderr
     assert run(tmp_path / "misuse").returncode == 0
+
+
+CLOCK = r"""
+#include <math.h>
+#include <string.h>
+#include "timed.h"
+static timed_state state;
+static timed_output output;
+static uint32_t step(double time, double x)
+{
+    timed_input input = {time, x};
+    return timed_step(&state, &input, &output);
+}
+int main(void)
+{
+    uint32_t first = 0;
+    (void)timed_init(&state);
+    first |= step(3.0, 1.0) | step(3.1, 1.0) | step(3.24, 1.0); /* late by less than half a period */
+    if (first != 0 || step(3.24, 1.0) != TIMED_TIME_SHIFTED || step(3.34, 1.0) != 0) return 1;
+    if (step(1.0, 1.0) != TIMED_TIME_SHIFTED || step(7.0, 2.0) != TIMED_TIME_SHIFTED || output.y != 8.0) return 2;
+    if (step(nan(""), 2.0) != (TIMED_TIME_SHIFTED | TIMED_INPUT_REFUSED) || output.y != 8.0) return 3;
+    if (step(7.1, nan("")) != TIMED_INPUT_REFUSED || step(7.2, 1.0) != 0) return 4;
+    state.memory.i += 1.0;
+    return step(7.3, 1.0) == TIMED_STATE_DAMAGED ? 0 : 5;
+}
+"""
+
+
+def test_a_time_that_does_not_advance_by_the_period_is_told(tmp_path):
+    """Where the function has a time and a rate, and whoever compiles asks for it; the checksum covers both."""
+    time, x, i = (ca.SX.sym(name) for name in ("time", "x", "i"))
+    function = ca.Function("timed", [time, x, i], [i + x + 0 * time, i + x], ["time", "x", "i"], ["y", "i_next"])
+    own = flight_function(function, state={"i": "i_next"}, rate=10)
+    assert own.statuses[32][0] == "TIME_SHIFTED"
+    assert 32 not in flight_function(function, state={"i": "i_next"}).statuses
+    put(tmp_path, {**function_files(own, Options("timed")), "main.c": CLOCK})
+    macros = ["-DTIMED_CHECK_TIME=1", "-DTIMED_CHECK_STATE=1"]
+    sources = [tmp_path / "main.c", tmp_path / "timed.c"]
+    build = run("gcc", *C99, *STRICT, *macros, "-o", tmp_path / "run", *sources, "-lm")
+    assert build.returncode == 0, build.stderr
+    assert run(tmp_path / "run").returncode == 0
 
 
 @pytest.mark.slow
