@@ -11,7 +11,7 @@ from casadi_gnc.benchmarks.contest import Family, digest
 from casadi_gnc.benchmarks.families import random_family
 from casadi_gnc.benchmarks.outside import Samples, boxed, read_commands, read_outside
 from casadi_gnc.benchmarks.sets import AllocationFamily, load_set
-from casadi_gnc.errors import BenchmarkError
+from casadi_gnc.errors import BenchmarkError, GncError
 from casadi_gnc.problem_files import document
 from casadi_gnc.problem_files.allocation_file import load_allocation
 
@@ -45,7 +45,13 @@ def _families(problem: str, samples: int | None) -> list[Family]:
         raise BenchmarkError(
             f"the set {name!r} has no family {only!r}; it has {', '.join(f.name for f in model.family)}"
         )
-    return [_family(one.name, group, one.title, _samples(one, folder), samples) for one in chosen]
+    found = []
+    for one in chosen:
+        try:
+            found.append(_family(one.name, group, one.title, _samples(one, folder), samples))
+        except GncError as error:
+            raise BenchmarkError(f"{name}, family {one.name!r}: {error}") from error
+    return found
 
 
 def _is_shipped(problem: str) -> bool:

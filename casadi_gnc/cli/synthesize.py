@@ -104,7 +104,9 @@ def _print(title: str, found: dict[str, Any]) -> None:
     if found.get("peak"):
         limit = found["peak"]["limit"]
         asked = "no limit given" if limit is None else f"limit {limit:.4g}"
-        typer.echo(f"peak command from the worst start: at most {found['peak']['bound']:.4g}, {asked}")
+        bound = found["peak"]["bound"]
+        most = "no bound is known" if bound is None else f"at most {bound:.4g}"
+        typer.echo(f"peak command from the worst start: {most}, {asked}")
     if found.get("saturation"):
         over = found["saturation"]["command_over_limit"]
         bound = "whatever the commands" if over is None else f"with commands up to {over:.4g} times their limits"

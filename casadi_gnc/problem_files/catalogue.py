@@ -52,8 +52,10 @@ def laws(problem: str | Path | None = None) -> list[Named]:
     if problem is None:
         return found
     document = read_kind(problem, "mission")
-    for table in document.data.get("scheme", []):
-        name = table.get("law", {}).get("type") if isinstance(table, dict) else None
+    schemes = document.at("scheme")
+    for table in schemes if isinstance(schemes, list) else []:
+        law = table.get("law") if isinstance(table, dict) else None
+        name = law.get("type") if isinstance(law, dict) else None
         if isinstance(name, str) and name not in [one.name for one in found]:
             try:
                 found.append(Named(name, LAWS.find(name, document.folder)))
@@ -67,7 +69,7 @@ def crafts(problem: str | Path | None = None) -> list[Named]:
     found = [Named(name, CRAFTS.find(name)) for name in CRAFTS.names()]
     if problem is not None:
         document = read_kind(problem, "mission")
-        name = document.data.get("spacecraft", {}).get("model")
+        name = document.at("spacecraft", "model")
         if name not in [one.name for one in found]:
             found.append(Named(str(name), craft_of(document)))
     return found
@@ -102,7 +104,7 @@ def _sample(parts: Parts, effort: Layout) -> Sample:
 
 
 def _names(document: Document, craft: str) -> bool:
-    return document.data.get("spacecraft", {}).get("model") == craft
+    return document.at("spacecraft", "model") == craft
 
 
 def fits(law: Named, sample: Sample | None) -> list[str] | None:

@@ -39,6 +39,13 @@ class Document:
         """The folder beside which the user's own code is looked for."""
         return self.path.parent
 
+    def at(self, *key: str) -> Any:
+        """Return what stands at a key below tables; None where there is none, or no table on the way."""
+        found: Any = self.data
+        for name in key:
+            found = found.get(name) if isinstance(found, dict) else None
+        return found
+
     def place(self, key: Key) -> str:
         """Return "file, line n, table.key" for messages."""
         return toml_place.describe(self.path, self.text, key)

@@ -68,7 +68,7 @@ def of_file(problem: str | Path) -> dict[str, Any]:
     kind, gathered = read(problem).data.get("kind"), Gathered()
     if kind == "mission":
         craft = catalogue.crafts(problem)
-        model = read(problem).data.get("spacecraft", {}).get("model")
+        model = read(problem).at("spacecraft", "model")
         own = next(one for one in craft if one.name == model)
         schema = mission(gathered, own.name, own.kind, {law.name: law.kind for law in catalogue.laws(problem)})
     else:

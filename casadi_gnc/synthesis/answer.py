@@ -27,10 +27,15 @@ class LmiStatus(Enum):
     FEASIBLE = (
         "Every constraint holds, by eigenvalues computed from the data, but the objective may be improved: see gap."
     )
-    NOT_CERTIFIED = "The solver's answer does not keep the constraints; enlarge the margins or take another back end."
+    NOT_CERTIFIED = (
+        "The solver's answer does not keep the constraints; change margins or units, or take another back end."
+    )
     INFEASIBLE = "No unknowns in the stated range meet all constraints, proved by multipliers; relax one in conflict."
     UNBOUNDED = "The objective falls without end along a ray; bound the unknowns that run away."
-    UNDECIDED = "The solver returned neither a point nor a proof; change units, margins or the back end."
+    UNDECIDED = (
+        "Neither a point nor a proof that there is none was found for the range asked for; "
+        "change units, margins or the back end."
+    )
 
     @property
     def holds(self) -> bool:
@@ -93,10 +98,14 @@ class LmiAnswer:
 
     def sentence(self) -> str:
         """Return what happened, where, and what to do."""
-        said, worst = self.status.value, self.worst
+        return self.status.value + self.details()
+
+    def details(self) -> str:
+        """Return where, and what to do, after a sentence that says what happened."""
+        said, worst = "", self.worst
         if self.status is LmiStatus.NOT_CERTIFIED and worst is not None:
             return (
-                f"{said} The worst is {worst.name!r}: smallest eigenvalue or element {worst.smallest:.3g} "
+                f" The worst is {worst.name!r}: smallest eigenvalue or element {worst.smallest:.3g} "
                 f"where {worst.margin:.3g} was asked for (rounding {worst.allowance:.1g})."
             )
         if self.status.holds and self.far:

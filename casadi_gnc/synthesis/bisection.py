@@ -47,11 +47,11 @@ def least(
     attempt : takes the number, and whether to seek a proof that there is no point; see `Lmis.attempt`.
     start : tried first, and doubled until there is a point.
     relative : to which the number is sought.
-    largest : from which on there is no more doubling.
+    largest : the last number tried.
     floor : to which the number is sought where it tends to zero.
     prove : whether every step is to have its proof.
     """
-    high, low = start, 0.0
+    high, low = min(start, largest), 0.0
     best = attempt(high, prove)
     while not best.status.holds:
         if high >= largest:
@@ -60,7 +60,7 @@ def least(
                 return Least(high, last, high)
             best = last
             break
-        low, high = high, 2 * high
+        low, high = high, min(2 * high, largest)
         best = attempt(high, prove)
     while high - low > max(relative * high, floor):
         middle = float(np.sqrt(low * high)) if low > 0.1 * high else (low + high) / 2

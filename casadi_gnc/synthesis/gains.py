@@ -25,17 +25,23 @@ class GainStatus(Enum):
     """How a synthesis ended; the value is the sentence for the reader."""
 
     CERTIFIED = "The gains keep what they promise: inequalities, poles, norm and peak recomputed from the data."
-    INFEASIBLE = "No gains meet the inequalities."
-    UNBOUNDED = "The inequalities leave the objective without a bound."
+    INFEASIBLE = "No gains meet the inequalities, proved by multipliers; relax one in conflict."
+    UNBOUNDED = "The inequalities leave the objective without a bound; bound the unknowns that run away."
     RUNS_AWAY = "The optimum is not attained, the gain runs to infinity: a bound is missing."
-    NOT_CERTIFIED = "No gain is certified."
+    NOT_CERTIFIED = (
+        "No gain is certified: the solver's answer does not keep the inequalities; change the margin, units or the "
+        "back end."
+    )
     UNSTABLE = "The closed loop has a pole that is not in the left half plane."
     NORM_EXCEEDED = "The closed loop's H-infinity norm is larger than the certified bound."
     ENERGY_EXCEEDED = "The closed loop's H2 norm is larger than the certified bound."
     POLES_OUTSIDE = "A pole of the closed loop lies outside a region that was asked for."
     NOT_FOUND = "No gains were found, by a search that is local and proves nothing."
     INPUT_EXCEEDED = "The simulated command is larger than its limit."
-    UNDECIDED = "No gain is returned."
+    UNDECIDED = (
+        "No gain is returned: neither gains nor a proof that there are none were found; change units, margins or the "
+        "back end."
+    )
 
 
 _OF_LMIS = {
@@ -63,7 +69,7 @@ class Synthesis:
     limit : of the command; NaN if none was given.
     ratios : interval of r = (assumed mass) / (true mass), or of any factor of the input matrix, about one
         within which the loop stays stable; None where the loop does not hold the input matrix.
-    missing : what would bound a gain that runs away, or what a search did not find.
+    missing : what would bound a gain that runs away, how far gains were sought, or what a search did not find.
     smallest : between which the smallest gamma lies: a bound from the multipliers, without margins, and what was
         reached; None where it was not sought.
     energy : the H2 norm and what was promised of it; None if it was not asked.
@@ -102,7 +108,7 @@ class Synthesis:
         """Return what happened and what to do."""
         said = self.status.value
         if self.status in _OF_LMIS.values():
-            return f"{said} {self.lmis.sentence()}"
+            return said + self.lmis.details() + (f" {self.missing}" if self.missing else "")
         if self.status is GainStatus.NORM_EXCEEDED and self.norm is not None:
             where = f"at {self.norm.frequency_rad_s:.3g} rad/s"
             return f"{said} It is {self.norm.upper:.4g} {where}, promised {self.promised:.4g}."
@@ -135,9 +141,9 @@ class Synthesis:
         return f" The smallest gamma is not known well: it lies between {low:.4g} and {high:.4g}."
 
 
-def failed(lmis: LmiAnswer) -> Synthesis:
-    """Return the synthesis for inequalities without a certified answer."""
-    return Synthesis(_OF_LMIS[lmis.status], {}, lmis)
+def failed(lmis: LmiAnswer, missing: str = "") -> Synthesis:
+    """Return the synthesis for inequalities without a certified answer; `missing` says how far they were sought."""
+    return Synthesis(_OF_LMIS[lmis.status], {}, lmis, missing=missing)
 
 
 def certify_gains(

@@ -157,6 +157,7 @@ RANDOM = "random = { seed = 1, actuators = 4 }\n"
         (HEAD + (FAMILY + RANDOM) * 2, "two families have the same name"),
         (HEAD + FAMILY + RANDOM + 'mood = "good"\n', "mood: unknown key"),
         (HEAD + FAMILY + 'commands = "nowhere.csv"\nproblem = "huang2020/allocation"\n', "nowhere.csv: cannot be read"),
+        (HEAD + FAMILY + 'commands = "c.csv"\nproblem = "hua#g2020/x"\n', "set.toml, family 'a': no problem file"),
         (HEAD.replace("benchmark", "mission") + FAMILY + RANDOM, "this takes a file of kind"),
         (HEAD.replace('"allocation"', '"synthesis"') + FAMILY + RANDOM, "is not for the contest 'synthesis'"),
     ],

@@ -50,3 +50,11 @@ def test_a_law_that_is_not_there_names_the_file(tmp_path):
     (tmp_path / "mine.toml").write_text(re.sub(r'^type = ".*"', 'type = "nobodys"', text, count=1, flags=re.MULTILINE))
     with pytest.raises(ProblemError, match=r"^mine\.toml: no law 'nobodys'; "):
         catalogue.laws(tmp_path / "mine.toml")
+
+
+@pytest.mark.parametrize("schemes", ["5", "[5, []]", '[{ law = 1.5 }, { law = ["x"] }, { law = { type = [1] } }]'])
+def test_schemes_that_are_no_tables_name_no_law(tmp_path, schemes):
+    """What lists laws for an editor reads files that `check` has not yet refused."""
+    path = tmp_path / "half.toml"
+    path.write_text(f'format = 1\nkind = "mission"\nscheme = {schemes}\n')
+    assert [law.name for law in catalogue.laws(path)] == LAWS.names()

@@ -132,3 +132,26 @@ def test_peak_after_the_start_is_bounded():
     assert found.value == pytest.approx(truth, rel=1e-4)
     with pytest.raises(SynthesisError, match="only of a stable one"):
         peak_command([[1.0]], [[1.0]], [[1.0]])
+
+
+@pytest.mark.parametrize(("fast", "slow"), [(1e5, 5e-13), (1e3, 1e-9), (1e6, 1.0)])
+def test_peak_of_poles_many_decades_apart(fast, slow):
+    """u = exp(-slow t) - exp(-fast t), zero at first, is largest where its derivative vanishes; in mixed states."""
+    mixed = np.array([[1.0, 0.5], [-0.3, 1.0]])
+    a, c = mixed @ np.diag([-slow, -fast]) @ np.linalg.inv(mixed), np.array([[1.0, -1.0]]) @ np.linalg.inv(mixed)
+    if slow < 1e-16 * fast * 1e3:  # mixed, its pole would be rounding
+        a, c, mixed = np.diag([-slow, -fast]), np.array([[1.0, -1.0]]), np.eye(2)
+    t = np.log(fast / slow) / (fast - slow)
+    truth = np.exp(-slow * t) - np.exp(-fast * t)
+    found = peak_command(a, c, mixed.sum(axis=1)[None, :])
+    assert found.value <= truth * (1 + 1e-9)
+    assert truth <= found.bound <= 1.01 * truth
+    assert found.value == pytest.approx(truth, rel=1e-3)
+
+
+def test_peak_grows_with_the_starts_however_large():
+    """Squares of 1e262 are no numbers; the command is linear in the start."""
+    a = np.array([[0, 1.0], [-1, -0.2]])
+    one, huge = (peak_command(a, [[0.0, 1.0]], [[size, 0.0]]) for size in (1.0, 3e262))
+    assert huge.value == pytest.approx(3e262 * one.value, rel=1e-12)
+    assert huge.bound == pytest.approx(3e262 * one.bound, rel=1e-12)

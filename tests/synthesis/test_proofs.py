@@ -10,7 +10,9 @@ from riccati_equations import riccati
 from casadi_gnc.errors import SynthesisError
 from casadi_gnc.problem_files.synthesis_file import _inequalities
 from casadi_gnc.synthesis import GainStatus, Lmis, LmiStatus, block_matrix, h_infinity_norm, observer, state_feedback
+from casadi_gnc.synthesis.answer import LmiAnswer
 from casadi_gnc.synthesis.backends import Claim, Found
+from casadi_gnc.synthesis.bisection import least
 from casadi_gnc.synthesis.proofs import covers, prove_infeasible
 from casadi_gnc.synthesis.scaling import scale
 
@@ -158,3 +160,32 @@ def test_the_smallest_gamma_lies_where_it_is_said_to(seed):
     dual = observer(A.T, B.T, C.T, D.T, E.T)  # the same numbers: the dual plant
     assert dual.status is GainStatus.CERTIFIED, dual.sentence()
     assert dual.promised == pytest.approx(found.promised, rel=0.005)
+
+
+def test_the_sentence_of_gains_that_are_not_there_says_it_once():
+    """What kept them away is told of the gains, not told again of the unknowns of the inequalities."""
+    for gains in GainStatus:
+        for lmis in LmiStatus:
+            assert lmis.value not in gains.value
+    none = state_feedback([[1.0]], [[0.0]], [[1.0]], [[1.0], [0.0]], [[0.0], [1.0]])
+    assert none.status is GainStatus.INFEASIBLE
+    assert none.sentence().startswith(GainStatus.INFEASIBLE.value)
+    assert LmiStatus.INFEASIBLE.value not in none.sentence()
+    assert none.sentence().endswith(none.lmis.details())
+
+
+def test_the_last_number_of_a_bisection_is_the_largest_that_was_asked_for():
+    """Doubled from 1, the last number below 10 would be 8 and the next 16; what holds from 9 on is found."""
+    tried = []
+
+    def attempt(number, prove, wanted):
+        tried.append(number)
+        status = LmiStatus.CERTIFIED if number >= wanted else LmiStatus.INFEASIBLE
+        return LmiAnswer(status, np.zeros(1), {}, 0.0, 0.0, (), None, None, "", 0, 0.0, Claim.SOLVED)
+
+    found = least(lambda number, prove: attempt(number, prove, 9.0), 1.0, 1e-6, 10.0)
+    assert found.answer.status is LmiStatus.CERTIFIED
+    assert found.value == pytest.approx(9.0, rel=1e-6)
+    none = least(lambda number, prove: attempt(number, prove, 11.0), 1.0, 1e-6, 10.0)
+    assert none.answer.status is LmiStatus.INFEASIBLE
+    assert none.value == max(tried) == 10.0

@@ -1,5 +1,6 @@
 """Recipes against Riccati equations and the published design."""
 
+import mpmath
 import numpy as np
 import pytest
 from riccati_equations import riccati, smallest_gamma
@@ -222,3 +223,32 @@ def test_bad_plants_are_refused():
     stuck = state_feedback([[1.0]], [[0.0]], [[1.0]], [[1.0]], [[0.0]])
     assert stuck.status in (GainStatus.INFEASIBLE, GainStatus.UNDECIDED)
     assert not stuck.is_certified
+
+
+@pytest.mark.slow
+def test_a_weak_input_has_its_gains_and_the_peak_of_its_command():
+    """An observer whose pole is 5e-13 rad/s beside gains of 1e10: what is told is so with fifty digits.
+
+    Of a disturbance that grows by one a second the position keeps an offset; the command follows from its start.
+    """
+    A, B, start = np.array([[0, 1.0], [-3.986e-7, 0]]), np.array([[0], [5e-8]]), np.array([3.0, 0, 0, 0, 0])
+    found = intermediate_observer(A, B, 200.0, vertices=[start[:2], -start[:2]])
+    assert found.status is GainStatus.CERTIFIED, found.sentence()
+    K, L = found.gains["K"], found.gains["L"]
+    with mpmath.workdps(50):
+        matrix = mpmath.matrix(5, 5)
+        a, b, k, gain = (mpmath.matrix(each.tolist()) for each in (A, B, K, L))
+        matrix[0:2, 0:2], matrix[0:2, 2:4], matrix[0:2, 4] = a, -b * k, -b
+        matrix[2:4, 0:2], matrix[2:4, 2:4] = gain, a - gain - b * k
+        matrix[4, 0:2], matrix[4, 2:4] = 200 * b.T * gain, -200 * b.T * gain
+        push = mpmath.matrix([0, b[1], 0, 0, 0])
+        growing = mpmath.lu_solve(matrix, -push)
+        offset = mpmath.lu_solve(matrix, growing)
+        assert abs(growing[0]) < 1e-20  # the disturbance itself is made good
+        assert float(mpmath.norm(offset[0:2])) <= found.norm.upper * (1 + 1e-6)
+        assert float(mpmath.norm(offset[0:2])) >= 0.99 * found.norm.lower
+        there = mpmath.expm(matrix * found.peak.time_s) * mpmath.matrix(start.tolist())
+        command = float(abs((k * there[2:4])[0] + there[4]))
+    assert command == pytest.approx(found.peak.value, rel=1e-6)
+    assert found.peak.value <= found.peak.bound <= 1.01 * found.peak.value
+    assert found.norm.upper <= found.promised

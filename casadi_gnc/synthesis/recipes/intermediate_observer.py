@@ -130,7 +130,7 @@ def intermediate_observer(
 
     found = least(attempt, 1.0, relative, largest_gamma)
     if not found.answer.status.holds:
-        return failed(found.answer)
+        return failed(found.answer, f"Looked for with gamma up to {found.value:g} (largest_gamma).")
     centre = lmis.attempt(zero.towards(one, found.value**2), "barrier", centre=True)
     best = centre if centre.status.holds else found.answer
     K, L = np.zeros((m, n)), np.zeros((n, n))
@@ -158,8 +158,9 @@ def certify_pair(
     n, m = B.shape
     loop, inputs = closed_loop(A, B, C, K, L, varpi)
     fixed, scaled = by_mass_ratio(A, B, C, K, L, varpi)
-    command = np.hstack([np.zeros((m, n)), -K, -np.eye(m)])
-    begun = None if vertices is None else np.hstack([vertices, np.zeros((len(vertices), n + m))])
+    # In the states of `closed_loop`, where a slow observer's pole is not lost beside fast ones.
+    command = np.hstack([-K, K + varpi * B.T, np.eye(m)])
+    begun = None if vertices is None else np.hstack([vertices, vertices, -varpi * vertices @ B])
     return certify_gains(
         {"K": K, "L": L},
         lmis,
@@ -167,7 +168,7 @@ def certify_pair(
         plant_rate(A, B),
         promised=promised,
         norm=h_infinity_norm(loop, inputs, np.hstack([C, np.zeros((len(C), n + m))])),
-        peak=peak_from(fixed + scaled, command, begun, plant_rate(A, B)),
+        peak=peak_from(loop, command, begun, plant_rate(A, B)),
         limit=limit,
         parts=(fixed, scaled),
         missing="Choose a smaller s: the gains grow with it.",
