@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from casadi_gnc.delivery.packaging import REALS
+from casadi_gnc.delivery.packaging import REALS, packed
 from casadi_gnc.embedded import fmu
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.errors import OutputError, PackageError
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.onboard import describe, sampled
+from casadi_gnc.missions.onboard import sampled
 from casadi_gnc.problem_files.by_name import mission_of
 from casadi_gnc.system.files import prepare_folder, write_beside
 from casadi_gnc.system.folders import workshop
@@ -50,7 +50,7 @@ def generate_fmu(
     target = Path("flight") / f"{options.name}.fmu" if out is None else Path(out)
     if target.suffix != ".fmu" or target.is_dir():
         raise OutputError(f"{target} does not end in .fmu; name the file to write with --out")
-    controller = describe(mission, scheme, tunable)
+    controller = packed(mission, scheme, tunable, monitored=False)
     files = fmu.fmu_files(controller, options, metadata.version("casadi-gnc"), mission.timing.duration, fmi)
     prepare_folder(target.parent)
     with workshop() as shop:

@@ -14,7 +14,7 @@ from casadi_gnc.delivery import making
 from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import frames, package, targets
-from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.frames import package_files
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import MOST_STEPS
@@ -73,11 +73,7 @@ def generate(
     options = Options(mission.name if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target)
     package.check_room(folder, force)
-    if mission.fault_handling is not None and mission.fault_handling.gain_change_s and not tunable:
-        raise PackageError(
-            "gain_change_s needs gains that can change; name them by --tunable, or leave it out of [fault_handling]"
-        )
-    controller = describe(mission, scheme, tunable, monitored=True)
+    controller = packed(mission, scheme, tunable, monitored=True)
     sources, made_of = making.kept(mission, controller, options, fresh=not isinstance(problem, Mission))
     about = {
         "name": options.name,
@@ -102,6 +98,15 @@ def generate(
 
     pack(folder, PackableController(controller), options, about, flown, readme, sources, boards, force=force)
     return {**about, "warnings": warnings(mission, controller.scheme, real)}
+
+
+def packed(mission: Mission, scheme: str | None, tunable: Sequence[str], *, monitored: bool) -> Controller:
+    """Return the controller that is packed; raise `PackageError` where new gains shall fade in and none can change."""
+    if mission.fault_handling is not None and mission.fault_handling.gain_change_s and not tunable:
+        raise PackageError(
+            "gain_change_s needs gains that can change; name them by --tunable, or leave it out of [fault_handling]"
+        )
+    return describe(mission, scheme, tunable, monitored=monitored)
 
 
 def made_by() -> dict[str, str]:

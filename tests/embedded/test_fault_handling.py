@@ -373,3 +373,5 @@ def test_options_that_do_not_fit_a_scheme_are_refused_with_their_line(tmp_path):
 def test_a_change_of_gains_needs_gains(tmp_path):
     with pytest.raises(PackageError, match="gain_change_s needs gains that can change; name them by --tunable"):
         generate(handled(gain_change_s=1.0), tmp_path / "slew", scheme="pd_pinv")
+    with pytest.raises(PackageError, match="gain_change_s needs gains that can change"):
+        casadi_gnc.generate_fmu(handled(gain_change_s=1.0), tmp_path / "slew.fmu", scheme="pd_pinv")
