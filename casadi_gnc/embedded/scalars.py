@@ -45,6 +45,7 @@ _CALLS = {
     ca.OP_SINH: "sinh",
     ca.OP_COSH: "cosh",
     ca.OP_TANH: "tanh",
+    ca.OP_ERF: "erf",
     ca.OP_FABS: "fabs",
     ca.OP_FLOOR: "floor",
     ca.OP_CEIL: "ceil",
@@ -158,6 +159,10 @@ def graph(function: ca.Function, places: Mapping[str, Sequence[str]]) -> tuple[l
             node = Node(code, place=places[inputs[given[0]]][given[1]])
         elif code == ca.OP_CONST:
             node = Node(code, number=function.instruction_constant(k))
+        elif code == ca.OP_CALL:
+            raise PrinterError(
+                f"{function.name()} calls a function that is never inlined; make that one without never_inline"
+            )
         else:
             node = _select(nodes, Node(code, tuple(value[i] for i in given)))
         value[target[0]] = len(nodes)

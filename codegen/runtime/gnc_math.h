@@ -293,6 +293,29 @@ GNC_INLINE double gnc_tanh(double x) {
     return x == x ? y : gnc_nan_();
 }
 
+/* ---- Error function -------------------------------------------------------------------------------- */
+
+/* Below 1, x + x P(x^2); from there on 1 - e^(-x^2) Q((|x| - 3)/(|x| + 3)), as what is taken off is small. P and Q are
+ * minimax polynomials, made with 60 digits. All x; max 1.35 ulp. */
+GNC_INLINE double gnc_erf(double x) {
+    const double a = gnc_fabs(x);
+    const double s = a < 1.0 ? a * a : 1.0, s3 = s * s * s;
+    const double p_low = gnc_poly3_(s, 0.12837916709551256, -0.37612638903183393, 0.11283791670939276) +
+                         s3 * gnc_poly3_(s, -0.026866170642337487, 0.0052239775997986182, -0.00085483256279412611);
+    const double p_high = gnc_poly3_(s, 0.00012055284633541632, -1.4924542340417247e-05, 1.6445063106371516e-06) +
+                          s3 * gnc_poly3_(s, -1.6190730651579864e-07, 1.3644831708592282e-08, -7.6585436879790383e-10);
+    const double near = x + x * (p_low + (s3 * s3) * p_high);
+    const double b = a < 6.0 ? a : 6.0;
+    const double t = (b - 3.0) / (b + 3.0), t3 = t * t * t;
+    const double q_low = gnc_poly3_(t, 0.17900115118135387, -0.32623356004589982, 0.24560380166428189) +
+                         t3 * gnc_poly3_(t, -0.15011593634472473, 0.071665850116798019, -0.024392327975932996);
+    const double q_high = gnc_poly3_(t, 0.0042703533585785932, 0.00071317400150438192, -0.00058109463945536051) +
+                          t3 * gnc_poly3_(t, 7.6391097370486397e-05, 0.00010294982681996221, 1.5202692020050951e-05);
+    const double far = gnc_copysign(1.0 - gnc_exp(-(b * b)) * (q_low + (t3 * t3) * q_high), x);
+    const double y = a < 1.0 ? near : far;
+    return x == x ? y : gnc_nan_();
+}
+
 /* ---- Logarithms ------------------------------------------------------------------------------------ */
 
 /* x = 2^k m with sqrt(1/2) <= m < sqrt(2), so that log m stays small when k = 0. */

@@ -282,6 +282,24 @@ GNC_INLINE float gnc_tanhf(float x) {
     return x == x ? y : gnc_nanf_();
 }
 
+/* ---- Error function -------------------------------------------------------------------------------- */
+
+/* All x; max 1.25 ulp. */
+GNC_INLINE float gnc_erff(float x) {
+    const float a = gnc_fabsf(x);
+    const float s = a < 1.0f ? a * a : 1.0f, s3 = s * s * s;
+    const float p_high = gnc_poly3f_(s, -0.026855126f, 0.00519073382f, -0.000803076313f) + s3 * 7.92038627e-05f;
+    const float p = gnc_poly3f_(s, 0.128379166f, -0.376126289f, 0.112836182f) + s3 * p_high;
+    const float near = x + x * p;
+    const float b = a < 4.0f ? a : 4.0f;
+    const float t = (b - 2.0f) / (b + 2.0f);
+    const float q_high = gnc_poly3f_(t, -0.0789869055f, 0.00372974039f, 0.00721255178f);
+    const float q = gnc_poly3f_(t, 0.255395681f, -0.427185863f, 0.241657272f) + (t * t * t) * q_high;
+    const float far = gnc_copysignf(1.0f - gnc_expf(-(b * b)) * q, x);
+    const float y = a < 1.0f ? near : far;
+    return x == x ? y : gnc_nanf_();
+}
+
 /* ---- Logarithms ------------------------------------------------------------------------------------ */
 
 /* x = 2^k m with sqrt(1/2) <= m < sqrt(2), so that log m stays small when k = 0. */

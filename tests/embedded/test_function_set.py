@@ -28,7 +28,7 @@ UNARY = (
         "sinh",
         "cosh",
     ),
-    *("tanh", "asinh", "acosh", "atanh", "fabs", "floor", "ceil", "sign", "neg", "inv", "not"),
+    *("tanh", "erf", "asinh", "acosh", "atanh", "fabs", "floor", "ceil", "sign", "neg", "inv", "not"),
 )
 BINARY = (
     *("add", "sub", "mul", "div", "pow", "atan2", "fmod", "copysign", "fmin", "fmax", "hypot", "lt", "le", "eq", "ne"),

@@ -99,7 +99,7 @@ def test_a_nan_result_is_always_the_same_one(library: Library, name: str, p: Pre
 
 @pytest.mark.parametrize("p", PRECISIONS, **by_name)
 def test_odd_and_even_functions_are_symmetric_bit_for_bit(library: Library, p: Precision):
-    for name in ("sin", "tan", "sinh", "tanh", "asin", "atan"):
+    for name in ("sin", "tan", "sinh", "tanh", "asin", "atan", "erf"):
         (x,) = arguments(name, p, 2000)
         np.testing.assert_array_equal(library(name, p, -x), -library(name, p, x))
     for name in ("cos", "cosh"):

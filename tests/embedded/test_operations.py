@@ -13,7 +13,7 @@ UNARY = {
     "asin": mpmath.asin, "acos": mpmath.acos, "atan": mpmath.atan, "sinh": mpmath.sinh, "cosh": mpmath.cosh,
     "tanh": mpmath.tanh, "asinh": mpmath.asinh, "acosh": mpmath.acosh, "atanh": mpmath.atanh, "fabs": abs,
     "floor": mpmath.floor, "ceil": mpmath.ceil, "sign": mpmath.sign, "neg": lambda x: -x, "inv": lambda x: 1 / x,
-    "not": lambda x: mpmath.mpf(x == 0),
+    "erf": mpmath.erf, "not": lambda x: mpmath.mpf(x == 0),
 }  # fmt: skip
 BINARY = {
     "add": lambda x, y: x + y, "sub": lambda x, y: x - y, "mul": lambda x, y: x * y, "div": lambda x, y: x / y,

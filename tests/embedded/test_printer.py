@@ -139,8 +139,11 @@ def test_float_text_has_no_double():
 
 def test_what_cannot_be_printed_is_told():
     x = ca.SX.sym("x")
-    with pytest.raises(PrinterError, match="f: operation 'erf' has no C form"):
-        print_function(ca.Function("f", [x], [ca.erf(x)]))
+    with pytest.raises(PrinterError, match="f: operation 'erfinv' has no C form"):
+        print_function(ca.Function("f", [x], [ca.erfinv(x)]))
+    closed = ca.Function("closed", [x], [x, x * x], {"never_inline": True})
+    with pytest.raises(PrinterError, match="f calls a function that is never inlined; make that one without"):
+        print_function(ca.Function("f", [x], [closed(x)[0]]))
     with pytest.raises(PrinterError, match="no SX function; expand it"):
         print_function(ca.Function("f", [m := ca.MX.sym("m")], [ca.exp(m)]))
     with pytest.raises(PrinterError, match="port o0 is sparse"):

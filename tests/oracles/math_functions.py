@@ -23,7 +23,7 @@ HEADERS = {"double": RUNTIME / "gnc_math.h", "float": RUNTIME / "gnc_mathf.h"}
 # fmt: off
 ONE_ARGUMENT = [
     "exp", "expm1", "log", "log1p", "sin", "cos", "tan", "sinh", "cosh", "tanh", "asin", "acos", "atan",
-    "sqrt", "fabs", "floor", "ceil", "sign",
+    "erf", "sqrt", "fabs", "floor", "ceil", "sign",
 ]
 # fmt: on
 TWO_ARGUMENTS = ["atan2", "pow", "fmod", "copysign", "min", "max"]

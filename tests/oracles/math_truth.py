@@ -107,6 +107,7 @@ SPECIAL = {
     "sinh": [(0.0, 0.0), (-0.0, -0.0), (INF, INF), (-INF, -INF), (NAN, NAN), (1e30, INF), (-1e30, -INF)],
     "cosh": [(0.0, 1), (-0.0, 1), (INF, INF), (-INF, INF), (NAN, NAN), (-1e30, INF)],
     "tanh": [(0.0, 0.0), (-0.0, -0.0), (INF, 1), (-INF, -1), (NAN, NAN), (1e30, 1), (-1e30, -1)],
+    "erf": [(0.0, 0.0), (-0.0, -0.0), (INF, 1), (-INF, -1), (NAN, NAN), (1e30, 1), (-1e30, -1)],
     "asin": [(0.0, 0.0), (-0.0, -0.0), (1, PI / 2), (-1, -PI / 2), (1.5, NAN), (-INF, NAN), (NAN, NAN)],
     "acos": [(1, 0.0), (-1, PI), (0.0, PI / 2), (-0.0, PI / 2), (1.5, NAN), (INF, NAN), (NAN, NAN)],
     "atan": [(0.0, 0.0), (-0.0, -0.0), (INF, PI / 2), (-INF, -PI / 2), (1, PI / 4), (NAN, NAN)],
@@ -186,6 +187,7 @@ TRUTH: dict[str, Callable] = {
 } | {
     "expm1": _expm1,
     "log1p": _log1p,
+    "erf": _one(libmp.mpf_erf),
     "fabs": libmp.mpf_abs,
     "sign": _sign,
     "atan2": lambda y, x: libmp.mpf_atan2(y, x, BITS),
