@@ -14,6 +14,7 @@ import pytest
 from mpmath import mp
 
 import casadi_gnc
+from casadi_gnc.allocation.in_flight import OnlineInFlight
 from casadi_gnc.allocation.online import OnlineSolver
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.linearised import linearised
@@ -191,7 +192,31 @@ AWAY = {
     "satellites/detumble_bdot": ("bdot", ["initial.rate_deg_per_s"]),
     "satellites/earth_pointing": ("mrp", ["initial.euler_321_deg", "initial.rate_deg_per_s"]),
     "satellites/safe_mode": ("modes", ["initial.euler_321_deg", "initial.rate_deg_per_s"]),
+    "huang2019/free_axes": ("pd_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2019/free_axes_two_observers": ("observers_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2019/nominal": ("observers_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2019/tough": ("finite_time_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2019/vertices": ("observers_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2019/wheel_faults": ("observers_pinv", ["initial.mrp", "initial.rate_rad_per_s"]),
+    "huang2020/detumble_chaser_model": ("observer_pinv", ["initial.rate_rad_per_s"]),
+    "satellites/earth_pointing_day": ("mrp", ["initial.euler_321_deg", "initial.rate_deg_per_s"]),
+    "satellites/slew_and_track": (
+        "eigenaxis",
+        ["scheme.eigenaxis.law.frequency", "scheme.eigenaxis.law.damping_ratio"],
+    ),
+    "shi2020/docking_as_printed": ("dobc", ["initial.position_m"]),
+    "sun2018/as_printed": ("literal", ["initial.attitude_error", "initial.rate_error_rad_per_s"]),
+    "sun2018/fast_tumble": ("tracking", ["initial.attitude_error", "initial.rate_error_rad_per_s"]),
+    "sun2018/quarter_limits": ("tracking", ["initial.attitude_error", "initial.rate_error_rad_per_s"]),
+    "sun2018/without_observer": ("neither", ["initial.attitude_error", "initial.rate_error_rad_per_s"]),
+    "tao2019/as_printed": ("corrected", ["initial.mrp", "initial.position_m"]),
+    "tao2019/case2": ("bounded", ["initial.mrp", "initial.position_m"]),
+    "tao2019/sweeps": ("auxiliary", ["initial.mrp", "initial.position_m"]),
+    "tao2019/wide_funnel_10ms": ("sampled", ["initial.mrp", "initial.position_m"]),
 }
+#: Steps of the differences, as shares of a number. One craft flies on its reference, with errors of the size of what
+#: doubles lose of an orbit's position: there a step has to stand out.
+STEPS = {"satellites/slew_and_track": [1e-2, 3e-3]}
 
 
 @pytest.mark.slow
@@ -213,18 +238,39 @@ def test_tangents_and_adjoints_of_the_first_1000_samples(name):
             float(richardson(
                 lambda at: (weights * finer.record(at, seed)[:, places]).sum(), p, direction, np.longdouble(step)
             )[0])
-            for step in max(abs(p[i]), 1e-3) * np.array([1e-7, 1e-8, 1e-9])
+            for step in max(abs(p[i]), 1e-3) * np.array(STEPS.get(name, [1e-7, 1e-8, 1e-9]))
         ]  # fmt: skip
         assert min(abs(back[i] / slope - 1) for slope in slopes) < 1e-6, varied.parameters.keys[i]
 
 
 ROBUST = ["initial.rate_rad_per_s", "scheme.funnel_robust.law.rate_gain"]
+#: Flights through the on-board allocator, and how many samples of them. A tumble has so many changes of sets that after
+#: more samples no step lies between them and the root of the gap.
+ON_BOARD = {
+    "huang2020/slew": ("funnel_robust", ROBUST, 1000),
+    "huang2019/tough": ("observers_robust", ["initial.mrp", "initial.rate_rad_per_s"], 1000),
+    "huang2020/detumble": ("observer_robust", ["initial.rate_rad_per_s"], 300),
+    "satellites/thruster_hold": ("robust", ["initial.euler_321_deg", "initial.rate_deg_per_s"], 1000),
+}
 
 
 @pytest.mark.slow
-def test_through_the_on_board_allocator():
-    """Truth: differences of the flight itself over 1000 samples; its allocator rounds as double does."""
-    varied, engine, p, _, record, weights = flown("huang2020/slew", "funnel_robust", ROBUST)
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=[] if one == "huang2020/slew" else pytest.mark.long) for one in ON_BOARD]
+)
+def test_through_the_on_board_allocator(name, monkeypatch):
+    """Truth: differences of the flight itself, of the step whose own error is estimated least.
+
+    The derivatives are those of the optimum, and the flight's forces lie within the certified gap of it: with the gap
+    of 1e-8 differences of a slew are off by up to 4e-6, so the solver is asked for a smaller one here.
+    """
+
+    def finer(allocator, compiler=None):
+        return OnlineSolver(allocator.problem, compiler=compiler, tolerance=1e-13)
+
+    monkeypatch.setattr(OnlineInFlight, "solver", finer)
+    scheme, keys, samples = ON_BOARD[name]
+    varied, engine, p, _, record, weights = flown(name, scheme, keys, samples)
     seed = varied.nominal.noise.seed
     found = engine.values(p, seed)
     assert np.array_equal(found.asked, record)
@@ -232,10 +278,11 @@ def test_through_the_on_board_allocator():
     np.testing.assert_allclose(engine.tangents(p, seed, weights, np.eye(len(p))), back, rtol=1e-8)
     for i, direction in enumerate(np.eye(len(p))):
         slopes = [
-            richardson(lambda at: (weights * engine.values(at, seed).asked).sum(), p, direction, step)[0]
-            for step in max(abs(p[i]), 1e-3) * np.array([1e-1, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5])
+            richardson(lambda at: (weights * engine.values(at, seed).asked).sum(), p, direction, step)
+            for step in max(abs(p[i]), 1e-3) * np.array([3e-2, 3e-3, 3e-4, 1e-4, 3e-5, 1e-5])
         ]
-        assert min(abs(back[i] / slope - 1) for slope in slopes) < 2e-5, varied.parameters.keys[i]
+        slope, _ = min(slopes, key=lambda one: one[1])
+        assert back[i] == pytest.approx(slope, rel=1e-6), varied.parameters.keys[i]
 
 
 def exact_forces(problem, command, box, raw):
