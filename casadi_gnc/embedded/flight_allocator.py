@@ -13,6 +13,7 @@ from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded import package
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry, bits, calls
+from casadi_gnc.embedded.manifest import digest
 from casadi_gnc.embedded.members import elements
 from casadi_gnc.embedded.source import allocation_sizes, allocator_units, problem_tables
 from casadi_gnc.signals import Layout, Signal
@@ -84,9 +85,10 @@ class FlightAllocator:
     def files(self, options: Options) -> dict[str, str]:
         """Return the files that fly."""
         about = self.about(options)
+        source = template("allocator_source.c.j2").render(**about)
         files = {
-            f"{options.name}.h": template("allocator_header.h.j2").render(**about),
-            f"{options.name}.c": template("allocator_source.c.j2").render(**about),
+            f"{options.name}.h": template("allocator_header.h.j2").render(**about, identity=digest(source)[:16]),
+            f"{options.name}.c": source,
             **allocator_units(self.problem, options),
         }
         runtime = assets.folder("codegen") / "runtime"

@@ -28,7 +28,8 @@ from casadi_gnc.system.templates import template
 def flight_files(controller: Controller, options: Options) -> dict[str, str]:
     """Return the files that fly: path inside the package -> text."""
     name = options.name
-    files = {f"{name}.h": render_header(controller, options), f"{name}.c": render_source(controller, options)}
+    source = render_source(controller, options)
+    files = {f"{name}.h": render_header(controller, options, digest(source)), f"{name}.c": source}
     files |= allocator_files(controller, options)
     files |= monitor_files(controller, options)
     runtime = assets.folder("codegen") / "runtime"

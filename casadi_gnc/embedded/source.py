@@ -52,8 +52,8 @@ def runtime_files(controller: Controller, options: Options) -> list[str]:
     return [*maths, "gnc_allocate.h", "gnc_allocate_internal.h"]
 
 
-def render_header(controller: Controller, options: Options) -> str:
-    """Return the text of the header."""
+def render_header(controller: Controller, options: Options, hashed: str) -> str:
+    """Return the text of the header; `hashed` is the hash of the source, by which the running code is known."""
     sizes = {
         "MEASURED": controller.measured.size,
         "MEMORY": controller.memory.size,
@@ -64,6 +64,7 @@ def render_header(controller: Controller, options: Options) -> str:
     state["previous"] = members(controller.actuators)
     return template("package_header.h.j2").render(
         **_common(controller, options),
+        identity=hashed[:16],
         period=options.constant(controller.period),
         sizes=[{"name": name, "value": value} for name, value in sizes.items()],
         statuses=[{"value": b, "name": n, "sentence": s} for b, (n, s) in controller.raised.items()],

@@ -1,5 +1,6 @@
 """Packages of allocation files: the words of the Python back end, faults at run time, other data, what is refused."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +80,11 @@ def test_words_are_those_of_the_python_back_end_and_faults_keep_the_certificate(
     assert (outputs[:, :count][stuck] == inputs[:, 3 + count :][stuck]).all()
     # The same commands with a fault have another answer.
     assert (np.abs(outputs[100:164, :count] - outputs[:64, :count]).max(axis=1) > 0.01).mean() > 0.5
+
+
+def test_the_running_code_can_say_what_it_is(package):
+    source = hashlib.sha256((package / "eight.c").read_bytes()).hexdigest()
+    assert f'#define EIGHT_IDENTITY "eight {source[:16]} double"' in (package / "eight.h").read_text()
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 Truth: what the header promises; CRC-32 by zlib; words of a flight that nobody misused.
 """
 
+import hashlib
 import struct
 import subprocess
 import zlib
@@ -133,6 +134,9 @@ SHIFTED, UNINITIALISED, UNCONFIGURED = 1 << 27, 1 << 28, 1 << 25
 @pytest.mark.parametrize("real", ["float64", "float32"])
 def test_misuse_is_told(real, tmp_path):
     folder = made("huang2020/slew", "pd_pinv", real, ("attitude_gain", "rate_gain"), steps=64)
+    source = hashlib.sha256((folder / "slew.c").read_bytes()).hexdigest()
+    numbers = {"float64": "double", "float32": "float"}[real]
+    assert f'#define SLEW_IDENTITY "slew {source[:16]} {numbers}"' in (folder / "slew.h").read_text()
     (tmp_path / "main.c").write_text(PROGRAM)
     include = [f"-I{path}" for path in (folder, folder / "test")]
     sources = [tmp_path / "main.c", folder / "slew.c", folder / "test" / "vectors.c"]
