@@ -21,6 +21,7 @@ determined; the gains returned are those at the analytic centre, which no solver
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -161,6 +162,9 @@ def certify_pair(
     # In the states of `closed_loop`, where a slow observer's pole is not lost beside fast ones.
     command = np.hstack([-K, K + varpi * B.T, np.eye(m)])
     begun = None if vertices is None else np.hstack([vertices, vertices, -varpi * vertices @ B])
+    peak = peak_from(loop, command, begun, plant_rate(A, B))
+    if peak is not None:  # its start in the states of `by_mass_ratio`: what is estimated begins at zero
+        peak = replace(peak, start=np.concatenate([peak.start[:n], np.zeros(n + m)]))
     return certify_gains(
         {"K": K, "L": L},
         lmis,
@@ -168,7 +172,7 @@ def certify_pair(
         plant_rate(A, B),
         promised=promised,
         norm=h_infinity_norm(loop, inputs, np.hstack([C, np.zeros((len(C), n + m))])),
-        peak=peak_from(loop, command, begun, plant_rate(A, B)),
+        peak=peak,
         limit=limit,
         parts=(fixed, scaled),
         missing="Choose a smaller s: the gains grow with it.",
