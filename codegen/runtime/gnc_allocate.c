@@ -36,7 +36,6 @@ static int read_command(command_t *command, const data_t *data, const real *torq
         command->c[i] = -(data->m1[i] * data->preferred[i] + data->m2[i] * previous[i]);
     }
     command->careful = CAREFUL_FROM_THE_START;
-    command->floor = NAME(floor_of)(data, command);
     sound &= GNC_ASSERT(data->ready == READY);
     return sound & GNC_ASSERT(is_finite(sum));
 }
@@ -125,19 +124,18 @@ static void forget(workspace_t *work)
 static int follow_sets(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
                        int32_t *iterations)
 {
+    last_t last;
     int certified = 0;
+    NAME(predict)(work, &last, command);
     *iterations = 0;
     if (work->warm != 0) {
-        certified = NAME(active_set)(work, data, command, point, WARM_WORK, iterations);
+        certified = NAME(from_last)(work, data, command, point, iterations);
     }
     if (!certified) {
-        int32_t more = 0;
-        work->warm = 0;
-        work->smooth = 0;
         work->stamp = 0;
-        certified = NAME(active_set)(work, data, command, point, COLD_WORK, &more);
-        *iterations += more;
+        certified = NAME(from_cold)(work, data, command, point, iterations);
     }
+    NAME(remember)(work, &last);
     return certified;
 }
 
@@ -167,11 +165,12 @@ static void solve_anew(workspace_t *work, const data_t *data, command_t *command
 }
 
 /* Is the gap so small that the answer is usable? With the added M1 the condition is 1e9: there 1e-5 of the objective can
- * be all that is left. */
-static int is_close(const data_t *data, const point_t *point)
+ * be all that is left. Where the objective next to vanishes no gap is a small part of it: then what counts is the last
+ * digit of its size over the box. */
+static int is_close(const data_t *data, const command_t *command, const point_t *point)
 {
-    return is_optimal(data, point) ||
-           point->gap <= (data->regularised != 0 ? (real)CLOSE_REGULARISED : (real)CLOSE) * point->phi;
+    return point->gap <= (data->regularised != 0 ? (real)CLOSE_REGULARISED : (real)CLOSE) * point->phi ||
+           point->gap <= (real)LAST_DIGIT * NAME(floor_of)(data, command);
 }
 
 static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const real *torque,
@@ -215,9 +214,9 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
         return hold(work, data, held, lower, upper, result);
     }
     (void)memcpy(work->answer, result->force, sizeof work->answer);
-    result->status = is_optimal(data, &point)  ? GNC_ALLOC_OPTIMAL
-                     : is_close(data, &point) ? GNC_ALLOC_AT_ROUNDING
-                                              : GNC_ALLOC_NOT_CERTIFIED;
+    result->status = is_optimal(data, &point)           ? GNC_ALLOC_OPTIMAL
+                     : is_close(data, &command, &point) ? GNC_ALLOC_AT_ROUNDING
+                                                        : GNC_ALLOC_NOT_CERTIFIED;
     return result->status;
 }
 

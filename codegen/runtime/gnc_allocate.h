@@ -30,8 +30,9 @@
  *     GNC_ALLOC_PREFIX  prefix of every symbol; two solvers in one program differ in it
  *
  * What is certified: gap <= tolerance * f (1e-8; float: 1e-5), status OPTIMAL; or gap <= 1e-6 f (float: 1e-4),
- * status AT_ROUNDING. Where rounding of the residuals hides so small a gap (f tiny against its size over the box),
- * they are summed with twice the digits, in float always. If M1 = M2 = 0 the forces are not unique and the set-up
+ * status AT_ROUNDING, as is a gap below 2e-16 (float: 4e-14) of the size of f over the box. Where rounding of the
+ * residuals hides so small a gap (f tiny against that size), they are summed with twice the digits, in float always.
+ * If M1 = M2 = 0 the forces are not unique and the set-up
  * adds M1 = 1e-9 h |A0|_F^2 I (float: 1e-5), which is part of f and of its certificate; up to 1e-5 f (float: 1e-3)
  * counts as rounding then. Single zero weights are allowed and nothing is added; in float few of these are certified.
  *
@@ -57,7 +58,7 @@
 /* How a call ended. <prefix>_status_text() gives the sentence for each. */
 enum gnc_alloc_status {
     GNC_ALLOC_OPTIMAL = 0,       /* gap <= tolerance * objective */
-    GNC_ALLOC_AT_ROUNDING = 1,   /* gap <= 1e-6 objective (float: 1e-4); usable */
+    GNC_ALLOC_AT_ROUNDING = 1,   /* gap <= 1e-6 objective (float: 1e-4), or below its last digit; usable */
     GNC_ALLOC_NOT_CERTIFIED = 2, /* iteration limit: feasible, its gap is reported */
     GNC_ALLOC_BAD_COMMAND = 3,   /* not finite, too large, lo > hi, absent: last feasible answer returned */
     GNC_ALLOC_BAD_PROBLEM = 4    /* set-up refused: weights, h, numbers that are not finite, a build with fused operations */

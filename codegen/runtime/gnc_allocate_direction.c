@@ -9,7 +9,7 @@
  * The linear algebra is that of the interior point with 1/d = 1/q on free and 0 on bounded actuators:
  *
  *     S_free diag(1/q) S_free' = L L',    I + L' W L = C C',    T = C^-1 L',    J = T Z
- *     dy = y_b - L C^-T eps,    eps = T W y_b + J dlambda - C^-1 L^-1 y_f
+ *     dy = y_b - T' eps,    eps = T W y_b + J dlambda - C^-1 L^-1 y_f
  *
  * with y_b what bounded and y_f what free actuators change of y by their own steps, to the bound and to gradient zero
  * without what y feeds back. These are far larger than dy, so dy is no difference of the two: it would lose the digits
@@ -27,25 +27,15 @@
 #define DEPENDENT 1e-11
 #endif
 
-/* L L' = S_free diag(1/q) S_free', an outer product at a time. */
+/* L L' = S_free diag(1/q) S_free' */
 static int factor_free_set(workspace_t *work, const data_t *data)
 {
-    int i, k, l, e = 0;
-    real packed[KT] = {0};
+    int i;
+    real weight[N];
     for (i = 0; i < N; ++i) {
-        if (work->side[i] == 0) {
-            for (k = 0; k < KT; ++k) {
-                packed[k] += data->SS[i][k] * data->inv_curvature[i];
-            }
-        }
+        weight[i] = work->side[i] == 0 ? data->inv_curvature[i] : 0;
     }
-    for (k = 0; k < K; ++k) {
-        for (l = 0; l <= k; ++l) {
-            work->L[k][l] = packed[e];
-            ++e;
-        }
-    }
-    return NAME(factor)(work->L, work->inv_L, 4 * EPS);
+    return NAME(factor_forces)(work->L, work->inv_L, data, weight, 4 * EPS);
 }
 
 /* T = C^-1 L' */
@@ -313,12 +303,9 @@ int NAME(newton_goal)(goal_t *goal, const vertices_t *vert, workspace_t *work, c
         eps[k] -= loose[k];
     }
     dt = weigh_vertices(vert, n, point, bounded, eps, dlambda);
-    backward(work->C, work->inv_C, eps);
+    multiply(work->T, eps, dy); /* T' eps */
     for (k = 0; k < K; ++k) {
-        dy[k] = bounded[k];
-        for (i = 0; i <= k; ++i) {
-            dy[k] -= work->L[k][i] * eps[i];
-        }
+        dy[k] = bounded[k] - dy[k];
     }
     multiply(work->W, dy, nu);
     (void)memcpy(goal->lambda, work->lambda, sizeof goal->lambda);

@@ -15,7 +15,7 @@
 
 enum { MAX_STEPS = 34 };
 #define NEAR_ROUNDING (real)16 /* of the gap that rounding explains: from there on residuals get twice the digits */
-#define SHORT_STEP (real)0.1 /* a step this short did not pay: centre instead */
+#define SHORT_STEP (real)0.1 /* a step this short did not pay: centre next */
 #define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
                               * easy problems and loses the way in degenerate ones */
 
@@ -204,14 +204,20 @@ static real towards(direction_t *dir, factors_t *fac, const data_t *data, const 
     return NAME(interior_direction)(dir, fac, data, it, point) ? step_length(dir, it) : 0;
 }
 
-/* A predictor, a corrector, and if that leads nowhere a step back to the centre. */
-static int iterate(iterate_t *it, real *force, const data_t *data, const command_t *command, const point_t *point,
-                   int products)
+/* A predictor and a corrector; after a round in which these led nowhere, a step back to the centre instead: no round
+ * computes more than two directions. */
+static int iterate(iterate_t *it, real *force, workspace_t *work, const data_t *data, const command_t *command,
+                   const point_t *point, int products)
 {
     factors_t fac;
     direction_t dir;
-    real step, sigma;
+    real step;
     int v;
+    fac.W = work->W;
+    fac.L = work->L;
+    fac.C = work->C;
+    fac.inv_L = work->inv_L;
+    fac.inv_C = work->inv_C;
     for (v = 0; v < V; ++v) {
         it->s[v] = larger(it->t - point->q[v], EPS * it->t);
     }
@@ -220,16 +226,21 @@ static int iterate(iterate_t *it, real *force, const data_t *data, const command
         return 0;
     }
     (void)memset(&dir, 0, sizeof dir); /* predictor: all products to zero */
-    step = towards(&dir, &fac, data, it, point);
-    sigma = mean_product(&dir, it, step, products) / it->mu;
-    aim(&dir, command, sigma * sigma * sigma * it->mu, step, 1); /* corrector */
-    step = towards(&dir, &fac, data, it, point);
-    if (step < SHORT_STEP) { /* some product lags far behind: no progress, back to the centre */
+    if (it->astray != 0) {
         aim(&dir, command, it->mu, 0, 0);
-        step = towards(&dir, &fac, data, it, point);
+    } else {
+        const real far = towards(&dir, &fac, data, it, point);
+        const real sigma = mean_product(&dir, it, far, products) / it->mu;
+        aim(&dir, command, sigma * sigma * sigma * it->mu, far, 1); /* corrector */
     }
+    step = towards(&dir, &fac, data, it, point);
     if (!GNC_ASSERT(step > 0)) {
         return 0;
+    }
+    if (it->astray == 0 && step < SHORT_STEP) { /* some product lags far behind */
+        it->astray = 1;
+    } else {
+        it->astray = 0;
     }
     take_step(it, force, &dir, command, step);
     return 1;
@@ -241,7 +252,11 @@ void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *comm
     iterate_t it;
     real force[N], best;
     int k, going;
-    const int products = set_out(&it, force, data, command, point);
+    int products;
+    command->floor = NAME(floor_of)(data, command);
+    it.astray = 0;
+    work->stamp = 0; /* the factors of the sets make room */
+    products = set_out(&it, force, data, command, point);
     rest(work, data, command, it.lambda, point);
     best = point->gap;
     going = !is_optimal(data, point);
@@ -257,7 +272,7 @@ void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *comm
         going = !is_optimal(data, point) && is_finite(point->gap);
         command->careful = point->gap <= NEAR_ROUNDING * command->floor ? 1 : command->careful;
         if (going && k < MAX_STEPS) {
-            going = iterate(&it, force, data, command, point, products);
+            going = iterate(&it, force, work, data, command, point, products);
         } else {
             going = 0;
         }

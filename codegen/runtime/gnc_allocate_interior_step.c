@@ -91,24 +91,14 @@ static void solve_B(const factors_t *fac, real *x)
 /* L L' = S diag(1/d) S' */
 static int factor_actuators(factors_t *fac, const data_t *data, const command_t *command, const iterate_t *it)
 {
-    int i, k, l, e = 0;
-    real packed[KT] = {0};
+    int i;
     for (i = 0; i < N; ++i) {
         /* Without weights the barrier bends enough; more would slow the last digits down to those of a gradient step. */
         const real bend = larger(data->q[i], (real)CURVATURE_FLOOR * (real)(int)N * data->column[i] + TINY);
         const real d = bend + it->zl[i] / it->down[i] + it->zu[i] / it->up[i];
         fac->invd[i] = command->dead[i] != 0 ? 0 : 1 / d;
-        for (k = 0; k < KT; ++k) {
-            packed[k] += data->SS[i][k] * fac->invd[i];
-        }
     }
-    for (k = 0; k < K; ++k) {
-        for (l = 0; l <= k; ++l) {
-            fac->L[k][l] = packed[e];
-            ++e;
-        }
-    }
-    return NAME(factor)(fac->L, fac->inv_L, 2 * EPS);
+    return NAME(factor_forces)(fac->L, fac->inv_L, data, fac->invd, 2 * EPS);
 }
 
 /* J = C^-1 L' Z */

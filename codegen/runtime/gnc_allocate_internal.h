@@ -42,7 +42,7 @@ enum {
     A = K + 2,                              /* more active vertices are always dependent */
     READY = 0x5EA1,                         /* mark of data that the set-up has filled */
     NOTHING = -1,                           /* no obstacle; else actuator i is i and vertex v is N + v */
-    WARM_WORK = 4, /* from the last answer: a step costs one, with an obstacle two, short of half way all */
+    WARM_WORK = 5, /* from the last answer: a step costs one, with an obstacle two, short of half way all */
     COLD_WORK = 1000 /* no limit but that of rounds */
 };
 
@@ -96,6 +96,7 @@ typedef NAME(result) result_t;
 #define CURVATURE_FLOOR 1e-12 /* least curvature of a Newton step, of that of the torque error in one force */
 #define NO_CURVATURE_FLOOR 1e-8 /* the same where there are no weights */
 #endif
+#define LAST_DIGIT 0.04 /* of the gap that rounding explains: 2e-16 of the size over the box, float 4e-14 */
 #define OFF_SIMPLEX (64 * (real)(int)V * EPS) /* of the sum of the vertex weights: more is no rounding */
 
 /* Before inner loops of few rounds: without their counters a small processor does a third less. The order of sums,
@@ -120,7 +121,7 @@ typedef struct {
     real previous[N];
     real lower[N], upper[N];
     int8_t dead[N]; /* 1: no room to move */
-    real floor;     /* gap that rounding explains */
+    real floor;     /* gap that rounding explains, set by the interior point */
     int careful;    /* 1: residuals with twice the digits */
 } command_t;
 
@@ -148,6 +149,12 @@ typedef struct {
     real force[N], bound[N], lambda[V], slack[V];
 } goal_t;
 
+/* The sets of the last sample. */
+typedef struct {
+    int8_t side[N], active[V];
+    int known; /* 0: there is none */
+} last_t;
+
 /* The interior point: its unknowns, the factors at one iterate, a direction, and what to aim at. */
 typedef struct {
     real down[N], up[N];   /* room: F - lo, hi - F */
@@ -155,12 +162,13 @@ typedef struct {
     real lambda[V], s[V];  /* vertex weights, and slack t - q_v */
     real t;
     real mu;               /* mean of all products multiplier * room */
+    int astray;            /* 1: the last step was short */
 } iterate_t;
 
 /* Triangular factors keep the inverse of their diagonal; for the letters see interior_step.c. */
 typedef struct {
     real invd[N]; /* 0 for dead actuators: they do not move */
-    real W[K][K], L[K][K], C[K][K], inv_L[K], inv_C[K];
+    real (*W)[K], (*L)[K], (*C)[K], *inv_L, *inv_C; /* those of the workspace */
     real z[K][V], J[K][V];
     real U[V][V], inv_U[V];   /* U'U = B, upper triangle */
     real B1[V], sum_B1;       /* B^-1 (1,...,1)' and its sum */
@@ -189,6 +197,7 @@ real NAME(floor_of)(const data_t *data, const command_t *command);
 int NAME(curvature_in_y)(const data_t *data, const real *lambda, real (*W)[K]);
 void NAME(inner_matrix)(real (*L)[K], real (*W)[K], real (*C)[K]);
 int NAME(factor)(real (*matrix)[K], real *inverse, real lost);
+int NAME(factor_forces)(real (*L)[K], real *inverse, const data_t *data, const real *weight, real lost);
 
 /* gnc_allocate_direction.c */
 int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always);
@@ -207,13 +216,33 @@ int NAME(exchange)(workspace_t *work, const vertices_t *vert, const data_t *data
                    const command_t *command, point_t *point, int last, int newcomer);
 void NAME(change_set)(workspace_t *work, int which, int upwards);
 
+/* gnc_allocate_obstacle.c: the first obstacle on the way to the goal, and going there or up to it. */
+int NAME(first_obstacle)(real *clear, const goal_t *goal, const workspace_t *work, const data_t *data,
+                         const command_t *command, const point_t *point);
+void NAME(move)(workspace_t *work, const goal_t *goal, const command_t *command, real clear, int full);
+void NAME(open_up)(workspace_t *work, const command_t *command, const point_t *point);
+void NAME(normalise)(real *lambda);
+
+/* gnc_allocate_cold_start.c */
+void NAME(start_cold)(workspace_t *work, const data_t *data, const command_t *command);
+int NAME(block_steps)(workspace_t *work, const data_t *data, const command_t *command, point_t *point, int most,
+                      int *arrived);
+
+/* gnc_allocate_prediction.c */
+void NAME(predict)(workspace_t *work, last_t *last, const command_t *command);
+void NAME(remember)(workspace_t *work, const last_t *last);
+
 /* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: the point belongs to the answer in the workspace. The
- * former leaves the best of its iterates and switches the command to careful where it must; the latter returns 1 if
- * the answer is certified, or as far as rounding lets it be; its budget is WARM_WORK or COLD_WORK. */
+ * former leaves the best of its iterates and switches the command to careful where it must; the latter, from the last
+ * answer or from none, return 1 if theirs is certified, or as far as rounding lets it be, and add up iterations. */
 void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
                           int32_t *iterations);
-int NAME(active_set)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
-                     int budget, int32_t *iterations);
+int NAME(is_there)(const workspace_t *work, const data_t *data, const command_t *command, const point_t *point,
+                   real last_gap);
+int NAME(from_last)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
+                    int32_t *iterations);
+int NAME(from_cold)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,
+                    int32_t *iterations);
 
 /* ---- small dense algebra: lower triangles, inverse diagonals ---------------------------------- */
 

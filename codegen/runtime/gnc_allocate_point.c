@@ -290,3 +290,24 @@ int NAME(factor)(real (*matrix)[K], real *inverse, real lost)
     }
     return sound;
 }
+
+/* L L' = S diag(weight) S', an outer product at a time. */
+int NAME(factor_forces)(real (*L)[K], real *inverse, const data_t *data, const real *weight, real lost)
+{
+    int i, k, l, e = 0;
+    real packed[KT] = {0};
+    for (i = 0; i < N; ++i) {
+        if (weight[i] > 0) {
+            for (k = 0; k < KT; ++k) {
+                packed[k] += data->SS[i][k] * weight[i];
+            }
+        }
+    }
+    for (k = 0; k < K; ++k) {
+        for (l = 0; l <= k; ++l) {
+            L[k][l] = packed[e];
+            ++e;
+        }
+    }
+    return NAME(factor)(L, inverse, lost);
+}

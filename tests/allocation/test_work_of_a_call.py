@@ -6,8 +6,8 @@ import online_allocator as oa
 import pytest
 
 PLAIN = (oa.A0_2020, oa.E_2020, oa.centre_of_mass_vertices([5e-3] * 3), 1, 1, 1e6)
-#: Steps that may be spent from the last answer before a cold start (WARM_WORK in gnc_allocate_active_set.c).
-WARM_STEPS = 4
+#: Steps that may be spent from the last answer before a cold start (WARM_WORK in gnc_allocate_internal.h).
+WARM_STEPS = 5
 
 
 def jumping(samples, seed=0):
@@ -57,7 +57,7 @@ def test_instructions_of_slew_and_jumps_on_a_board(tmp_path):
     assert np.quantile(ratio, 0.5) <= 1.2
     assert warm["instructions"].max() <= 1.2 * cold["instructions"].max()
     # Where the ratio is larger, the cold start is one of the short ones.
-    assert (warm["instructions"].astype(int) - cold["instructions"]).max() <= 0.5 * usual
+    assert (warm["instructions"].astype(int) - cold["instructions"]).max() <= 0.55 * usual
 
 
 @pytest.mark.tools("arm-none-eabi-gcc", "qemu-system-arm")
