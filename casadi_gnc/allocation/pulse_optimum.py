@@ -53,12 +53,7 @@ class PulseRules:
 
     def __post_init__(self) -> None:
         for number, pulse in enumerate(self.pulses, 1):
-            if not 0 <= pulse.least_on <= self.period:
-                told = f"the least width is {pulse.least_on:g} s"
-                raise AllocationError(f"thruster {number}: {told}, expected 0 to the period, {self.period:g} s")
-            if not 0 <= pulse.quantum <= self.period:
-                told = f"the quantum is {pulse.quantum:g} s"
-                raise AllocationError(f"thruster {number}: {told}, expected 0 to the period, {self.period:g} s")
+            pulse.check(number, self.period)
         self.valves.check(len(self.pulses))
 
     def broken(self, widths: ArrayLike) -> list[str]:

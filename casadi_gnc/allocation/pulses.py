@@ -33,7 +33,7 @@ import casadi as ca
 
 from casadi_gnc.errors import AllocationError
 from casadi_gnc.mathematics import bounds
-from casadi_gnc.mathematics.exact import is_zero
+from casadi_gnc.mathematics.exact import is_number, is_zero
 from casadi_gnc.signals import Layout, Signal
 
 
@@ -51,6 +51,13 @@ class Pulse:
     least_on: Any = 0.0
     quantum: Any = 0.0
     carries: bool = True
+
+    def check(self, number: int, period: float) -> None:
+        """Raise `AllocationError` where an actuator, counted from 1, makes no such pulse in a period [s]."""
+        for what, value in (("least width", self.least_on), ("quantum", self.quantum)):
+            if is_number(value) and not 0 <= value <= period:
+                told = f"the {what} is {value:g} s"
+                raise AllocationError(f"thruster {number}: {told}, expected 0 to the period, {period:g} s")
 
     def width(self, wanted: Any, period: float) -> Any:
         """Return t for a wanted width, both [s]."""
@@ -129,6 +136,8 @@ class PulseModulation:
         told: list[Any] = [asked[i] for i in range(len(self.pulses))]
         both = enumerate(zip(self.pulses, self.most, strict=True))
         made = [(i, pulse, most) for i, (pulse, most) in both if pulse is not None]
+        for number, (_, pulse, _) in enumerate(made, 1):
+            pulse.check(number, period)
         wanted = [asked[i] * period + carried.impulse_carry[place] for place, (i, _, _) in enumerate(made)]
         widths = [pulse.width(each / most, period) for each, (_, pulse, most) in zip(wanted, made, strict=True)]
         if self.valves:

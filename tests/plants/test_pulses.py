@@ -11,7 +11,7 @@ from pydantic import ValidationError
 import casadi_gnc
 from casadi_gnc.allocation.pulses import Pulse, PulseModulation, Valves
 from casadi_gnc.campaigns.engines import CompiledBatch, best_vectors
-from casadi_gnc.errors import FlightError, ProblemError
+from casadi_gnc.errors import AllocationError, FlightError, ProblemError
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.mechanics.firing import STANDARD_GRAVITY, FiringThrusters
 from casadi_gnc.missions.parameters import vary
@@ -109,6 +109,7 @@ def test_what_is_asked_beyond_all_turns_is_lost():
         ({"never_together": [[1, 1]]}, "thruster 1 is paired with itself"),
         ({"never_together": [[1, 9]]}, "thruster 9 is not one of 8"),
         ({"open_at_most": 0}, "is 0, expected a number >= 1"),
+        ({"open_at_most": 2, "choice": "together"}, "expected 3 or more for pulses chosen together"),
     ],
 )
 def test_bad_valves(valves, told):
@@ -202,9 +203,18 @@ def test_a_flight_keeps_the_rules_of_its_valves():
     assert "authority.pulse_limit_cycle" not in [check.name for check in said]  # nothing is promised of those that wait
 
 
+@pytest.mark.parametrize("pulse", [Pulse(0.3), Pulse(0.0, 0.3)])
+def test_pulses_longer_than_a_period_are_refused(pulse):
+    modulation = PulseModulation([pulse], [1.0])
+    with pytest.raises(AllocationError, match=r"thruster 1: the .* is 0.3 s, expected 0 to the period, 0.2 s"):
+        modulation(ca.DM([0.5]), modulation.memory.split(ca.DM([0.0])), PERIOD)
+
+
 @pytest.mark.slow
-def test_pulses_have_the_same_words_on_both_engines():
-    mission = casadi_gnc.load(PULSES, changes=PINV).with_timing(duration=10.0)
+@pytest.mark.parametrize("choice", ["each", "together"])
+def test_pulses_have_the_same_words_on_both_engines(choice):
+    valves = {"never_together": [[1, 2]], "choice": choice}
+    mission = casadi_gnc.load(PULSES, changes={**PINV, "valves": valves}).with_timing(duration=10.0)
     c, vm = (casadi_gnc.fly(mission, engine=engine, maths="libm").samples for engine in ("c", "vm"))
     assert np.array_equal(c, vm)
 

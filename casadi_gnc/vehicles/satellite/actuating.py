@@ -19,7 +19,7 @@ from casadi_gnc.missions.craft import EffortKeys
 from casadi_gnc.tables.allocation import Robust
 from casadi_gnc.tables.part import MisfitError
 
-from . import part_tables
+from . import part_tables, pulse_tables
 from .momentum import MomentumSharing
 from .on_board import LeastByField, TorqueByField, WheelLimits
 
@@ -37,9 +37,9 @@ def actuators(craft: SatelliteCraft, centre: Any) -> Actuators:
     rows = []
     if craft.wheel:
         rows.append(-part_tables.directions(craft.wheel, "axis"))
-    if craft.thruster:
-        rows.append(part_tables.thrusters(craft.thruster).arms(centre))
-    fixed = ca.horzcat(ca.DM(3, 0), *rows)
+    torques = part_tables.thrusters(craft.thruster).arms(centre) if craft.thruster else ca.DM(3, 0)
+    rows.append(torques)
+    fixed = ca.horzcat(*rows)
     most = [each.max_torque_N_m for each in craft.wheel]
     dipoles = [each.max_dipole_A_m2 for each in craft.magnetorquer]
     lower = [-each for each in most] + [each.min_force_N for each in craft.thruster] + [-each for each in dipoles]
@@ -58,7 +58,9 @@ def actuators(craft: SatelliteCraft, centre: Any) -> Actuators:
         upper=upper,
         reach=None if limits is None else limits.reach,
         judge=None if limits is None else limits.judge,
-        modulation=part_tables.modulation(len(craft.wheel), craft.thruster, len(craft.magnetorquer), craft.valves),
+        modulation=pulse_tables.modulation(
+            len(craft.wheel), craft.thruster, len(craft.magnetorquer), craft.valves, torques
+        ),
     )
 
 

@@ -48,11 +48,11 @@ from .part_tables import (
     MomentumTable,
     SloshTable,
     ThrusterTable,
-    ValveTable,
     WheelTable,
 )
 from .plant import Satellite
 from .plate_tables import AirTable, PlateTable
+from .pulse_tables import ValveTable
 from .reference_tables import AnyReference, InertialTable, timeline
 from .sensor_tables import AnySensor, made
 from .surroundings import SunDirection, Surroundings
@@ -118,6 +118,8 @@ class SatelliteCraft(Craft):
         self.pointed()
         self._estimator()
         actuating.sharing(self)
+        if self.valves is not None:
+            self.actuators()
         return self
 
     def _when(self) -> Epoch | None:

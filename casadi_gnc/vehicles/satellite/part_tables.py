@@ -12,7 +12,6 @@ from typing import Annotated, Any
 import casadi as ca
 from pydantic import Field, field_validator, model_validator
 
-from casadi_gnc.allocation.pulses import Pulse, PulseModulation, Valves
 from casadi_gnc.mathematics import exact
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import appendages
@@ -20,6 +19,8 @@ from casadi_gnc.mechanics import satellite_parts as parts
 from casadi_gnc.mechanics.firing import FiringThrusters
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
+
+from .pulse_tables import PulseTable
 
 
 class Axial(Part):
@@ -74,38 +75,6 @@ class WheelTable(Axial):
         if self.max_speed_rad_per_s is not None:
             return self.max_speed_rad_per_s
         return math.inf if self.max_momentum_N_m_s is None else self.max_momentum_N_m_s / self.spin_inertia
-
-
-class PulseTable(Part):
-    """Pulses of a thruster that knows on and off alone: one a sample, its width from what is asked of it."""
-
-    least_on_s: NonNegative = Field(default=0.0, description="least width of a pulse")
-    quantum_s: NonNegative = Field(default=0.0, description="least difference of two widths; 0: any width")
-    delay_s: NonNegative = Field(default=0.0, description="from the sample to the pulse, less than a sample period")
-    carry: bool = Field(default=True, description="what a pulse lacks is carried over to the next (sigma-delta)")
-
-
-class ValveTable(Part):
-    """Which valves of thrusters that make pulses may be open together."""
-
-    never_together: list[Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=2, max_length=2)]] = Field(
-        default=[], max_length=64, description="pairs of thrusters, counted from 1, that never open in the same sample"
-    )
-    open_at_most: Annotated[int, Field(ge=1)] | None = Field(
-        default=None, description="so many valves in one sample, those of the largest impulses due"
-    )
-
-    def check(self, thrusters: Sequence[ThrusterTable]) -> None:
-        """Raise `MisfitError` where the rules are none for these thrusters."""
-        if not any(each.pulse is not None for each in thrusters):
-            raise MisfitError("no thruster makes pulses, and the rules are for those; give one a pulse", "valves")
-        for first, second in self.never_together:
-            if first == second:
-                raise MisfitError(f"thruster {first} is paired with itself; give two", "valves", "never_together")
-            for number in (first, second):
-                if number > len(thrusters) or thrusters[number - 1].pulse is None:
-                    why = "makes no pulses" if number <= len(thrusters) else f"is not one of {len(thrusters)}"
-                    raise MisfitError(f"thruster {number} {why}; give two that make pulses", "valves", "never_together")
 
 
 class ThrusterTable(Part):
@@ -207,25 +176,6 @@ def thrusters(tables: Sequence[ThrusterTable]) -> parts.Thrusters:
         tuple(table.pulse is not None for table in tables),
         array([0.0 if table.pulse is None else table.pulse.delay_s for table in tables]),
     )
-
-
-def modulation(
-    between: int, tables: Sequence[ThrusterTable], after: int, valves: ValveTable | None = None
-) -> PulseModulation | None:
-    """Return what makes pulses of what is asked of thrusters, between other actuators; None where none makes any."""
-    if all(table.pulse is None for table in tables):
-        return None
-    pulses = [
-        None if pulse is None else Pulse(pulse.least_on_s, pulse.quantum_s, pulse.carry)
-        for pulse in (table.pulse for table in tables)
-    ]
-    none = [None] * between, [None] * after
-    most = [*none[0], *(table.max_force_N for table in tables), *none[1]]
-    rules = Valves()
-    if valves is not None:
-        pairs = tuple((i - 1 + between, j - 1 + between) for i, j in valves.never_together)
-        rules = Valves(pairs, valves.open_at_most)
-    return PulseModulation((*none[0], *pulses, *none[1]), most, rules)
 
 
 def magnetorquers(tables: Sequence[MagnetorquerTable]) -> parts.Magnetorquers:
