@@ -129,6 +129,8 @@ def _print(found: Falsified) -> None:
     for note in found.notes:
         say(f"note: {note}")
     say(found.sentence)
+    if found.proved is not None:
+        say(found.proved.sentence)
     if found.minimal is not None and found.minimal is not found.broken:
         names = ", ".join(escape(each.key) for each in found.minimal.moved)
         say(f"alone enough, at {found.minimal.distance:.3g} standard deviations: {names}")

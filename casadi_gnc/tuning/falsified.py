@@ -8,6 +8,7 @@ from typing import Any
 
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.tuning.broken_case import Break, Moved
+from casadi_gnc.tuning.certificate import Certificate
 from casadi_gnc.tuning.descending import Effort
 from casadi_gnc.tuning.flights import Step
 from casadi_gnc.tuning.reach import Reach
@@ -24,6 +25,7 @@ class Falsified:
     reach : where was searched.
     broken : the smallest break found, None for none.
     minimal : a break with as few dispersions as were found to do.
+    proved : what is proved of the linear loop, None where a break was found.
     path : where the search was, from the nominal to the smallest break.
     first : flights until the first break; None without.
     left, left_at, left_distance : the least robustness of all flights, what differs there, and how far away it is.
@@ -40,6 +42,7 @@ class Falsified:
     reach: Reach
     broken: Break | None
     minimal: Break | None
+    proved: Certificate | None
     path: tuple[Step, ...]
     first: int | None
     left: float
@@ -90,6 +93,7 @@ class Falsified:
                 "distance": self.left_distance,
                 "moved": [{"key": each.key, "value": each.value, "nominal": each.nominal} for each in self.left_at],
             },
+            "certificate": None if self.proved is None else self.proved.as_data(),
             "effort": {
                 "flights": self.flights,
                 "flights_at_first_break": self.first,

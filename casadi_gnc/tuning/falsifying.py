@@ -21,6 +21,7 @@ from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.problem_files.by_name import mission_of
 from casadi_gnc.problem_files.loading import load_document
 from casadi_gnc.tuning.broken_case import Break, break_of, document_of, moved_of
+from casadi_gnc.tuning.certificate import Certificate, certificate
 from casadi_gnc.tuning.descending import Effort
 from casadi_gnc.tuning.falsified import Falsified
 from casadi_gnc.tuning.flights import Build, Flights, Told, Trial
@@ -118,6 +119,12 @@ def falsify(
         else:
             notes.append("what broke among many flights did not break as a file of its own, and is no break")
             first = None
+    proved = None
+    if broken is None:
+        cases = builds[0].objective.cases
+        proved = certificate(cases.varied, space, reach, asked)
+        if len(builds) > 1:
+            proved = Certificate(asked.id, why="`over` asks for other files, and what is proved is of one")
     least = searched.lowest
     assert least is not None
     changes = builds[least.of].changes
@@ -130,6 +137,7 @@ def falsify(
         reach=reach,
         broken=broken,
         minimal=minimal,
+        proved=proved,
         path=tuple(searched.path),
         first=first,
         left=least.value,

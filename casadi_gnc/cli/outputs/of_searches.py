@@ -81,6 +81,22 @@ class Step(TypedDict):
 
 
 @_TOLD
+class Certificate(TypedDict):
+    """What is proved for every dispersion in a box that contains the set."""
+
+    requirement_holds: bool
+    stable: bool
+    least_robustness: float | None
+    """That is left at least, below 0 for nothing proved; null where nothing bounds it."""
+    stable_up_to_times_the_box: float | None
+    model: str | None
+    """Of what it is proved; null where nothing is."""
+    model_is_the_loop_of_the_flight: bool
+    """But for limits of actuators and noise."""
+    sentence: str
+
+
+@_TOLD
 class Falsification(TypedDict):
     """The smallest break found, or the margin that is left."""
 
@@ -94,6 +110,8 @@ class Falsification(TypedDict):
     broken: Break | None
     minimal: Break | None
     """The break with what does not matter as in the file."""
+    certificate: Certificate | None
+    """What is proved of the linear loop; null where a break was found."""
     least: Least
     effort: Effort
     path: list[Step]
