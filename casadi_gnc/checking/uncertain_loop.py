@@ -27,6 +27,8 @@ from casadi_gnc.synthesis.contraction import UncertainMap
 
 #: Share of the largest entry below which a difference is rounding.
 _ROUNDING = 1e-11
+#: Singular values of perturbations below this share of the largest go to the rest: inequalities stay small.
+_SMALL = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +82,10 @@ class UncertainLoop:
         return entries.reshape(self.size, self.size).T
 
     def as_map(self, units: np.ndarray) -> UncertainMap:
-        """Return the map with s divided by units, (n,): a perturbation for each part and each row of the rest."""
+        """Return the map with s divided by units, (n,).
+
+        It has a perturbation for each part that is not small, and for each row of the rest with what is small.
+        """
         left, right = [], []
 
         def scaled(matrix: np.ndarray) -> np.ndarray:
@@ -88,14 +93,16 @@ class UncertainLoop:
 
         nominal = scaled(self.square(self.A.centre))
         least = _ROUNDING * np.abs(nominal).max(initial=1.0)
-        for entries in self.A.parts:
-            u, sizes, v = np.linalg.svd(scaled(self.square(entries)))
-            rank = int((sizes > least).sum())
+        rest = scaled(self.square(self.A.rest))
+        parts = [np.linalg.svd(scaled(self.square(entries))) for entries in self.A.parts]
+        small = max(least, _SMALL * max((sizes.max(initial=0.0) for _, sizes, _ in parts), default=0.0))
+        for u, sizes, v in parts:
+            rank = int((sizes > small).sum())
+            rest += np.abs((u[:, rank:] * sizes[rank:]) @ v[rank:])
             if rank:
                 root = np.sqrt(sizes[:rank])
                 left.append(u[:, :rank] * root)
                 right.append(root[:, None] * v[:rank])
-        rest = scaled(self.square(self.A.rest))
         for row in np.flatnonzero((rest > least).any(axis=1)):  # abs(E_row s) <= norm of sqrt(entries) (rest_row s)
             entries = rest[row] > least
             left.append(np.eye(self.size)[:, [row]])

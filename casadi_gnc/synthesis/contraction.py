@@ -9,7 +9,7 @@ abs(d_i) <= f, or, where its shape is not square, any matrix of a norm up to f.
 | f | `factor` | size of the set |
 | rho | `rate` | factor of each step |
 | P > 0 | `P` | s' P s falls by rho^2 at least in each step |
-| D_i = D_i' > 0 | `D` | scaling; any matrix where d_i is a number, else a multiple of the identity |
+| D_i = D_i' > 0 | `D` | scaling; any matrix if d_i is a number (and few are unknown), else a multiple of 1 |
 | G_i = -G_i' | `G` | scaling that knows that d_i is real; 0 of rank one, and of a matrix |
 
 With M = [A L; f R 0] and w = d z for z = R s,
@@ -34,6 +34,8 @@ from casadi_gnc.synthesis.answer import LmiAnswer
 from casadi_gnc.synthesis.bisection import least
 from casadi_gnc.synthesis.lmis import Lmis
 
+#: Perturbations of so many rows have full scalings; with more, which take half a minute, each has a single number.
+_FULL = 12
 #: Slack of the inequality, relative to P >= 1.
 _MARGIN = 1e-9
 
@@ -145,10 +147,11 @@ def _posed(of: UncertainMap, rate: float, factor: float) -> tuple[Lmis, ca.SX]:
     turn = _turn(n)
     of = UncertainMap(turn @ of.A @ turn.T, tuple(turn @ L for L in of.left), tuple(R @ turn.T for R in of.right))
     P = lmis.symmetric("P", n)
+    every = sum(L.shape[1] for L in of.left)
     inner, outer, mixed = ca.SX(n, n), [], []
     for i, (L, R) in enumerate(zip(of.left, of.right, strict=True)):
         width, size = L.shape[1], R.shape[0]
-        if width == size:
+        if width == size and every <= _FULL:
             D, G = lmis.symmetric(f"D{i}", size), _skew(lmis, f"G{i}", size)
         else:
             D, G = lmis.scaled_identity(f"D{i}", max(width, size)), ca.SX(size, width)
