@@ -152,7 +152,7 @@ def uncertain_loop(varied: Varied, low: np.ndarray, high: np.ndarray) -> Uncerta
     at_target = ca.SX(first)
     for signal, values in mission.target.items():
         at_target[mission.truth.state.place(signal)] = ca.DM(values)
-    begun = [loop.started(ca.SX(0), loop.seen(loop.sensed(ca.SX(0), each, quiet))) for each in (first, at_target)]
+    begun = [loop.started(ca.SX(0), loop.sensed(ca.SX(0), each, quiet)) for each in (first, at_target)]
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
     reference: Any = ca.Function("target", [p], [ca.vertcat(at_target[rows], begun[1])])(centre)
     target = np.array(ca.DM(reference)).ravel()

@@ -120,7 +120,7 @@ def certificate(varied: Varied, space: Space, reach: Reach, requirement: Require
         enlarged = borne(loop.as_map(found[0].units), most=_LARGER, relative=0.1)
     except GncError as error:
         return Certificate(name, why=str(error))
-    except (RuntimeError, NotImplementedError, TypeError) as error:  # CasADi, of what has no symbolic form
+    except (RuntimeError, TypeError, ValueError) as error:  # of what has no symbolic form
         return Certificate(name, why=str(error).splitlines()[-1])
     return Certificate(name, least, min(each.proof.rate for each in found), max(enlarged, 1.0), loop.exact)
 
