@@ -13,6 +13,7 @@ from casadi_gnc.campaigns.distributions import Choice, Distribution, LogUniform,
 from casadi_gnc.campaigns.orientations import Direction, Form, Rotation
 from casadi_gnc.errors import CampaignError, GncError
 from casadi_gnc.system.csv_file import read_table
+from casadi_gnc.tables.matrices import SYMMETRIC
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
 
 Range = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -105,7 +106,9 @@ class CorrelatedTable(Part):
     """A block of jointly normal numbers."""
 
     mean: Numbers
-    covariance: Annotated[list[Numbers], Field(min_length=1)] = Field(description="rows, positive semidefinite")
+    covariance: Annotated[list[Numbers], Field(min_length=1), SYMMETRIC] = Field(
+        description="rows, positive semidefinite"
+    )
 
     @model_validator(mode="after")
     def _fit(self) -> CorrelatedTable:
@@ -203,7 +206,8 @@ class DispersionTable(Part):
         kind = self._given()[0]
         made = self._made(kind, size, folder, nominal)
         if made.values != size:
-            raise MisfitError(f"gives {made.values} numbers; the key {self.key!r} stands for {size}", kind)
+            once = "; of a symmetric matrix give mirror entries once" if _mirrors(made.values, size) else ""
+            raise MisfitError(f"gives {made.values} numbers; the key {self.key!r} stands for {size}{once}", kind)
         return made
 
     def _made(self, kind: str, size: int, folder: Path, nominal: list[float] | None) -> Distribution:
@@ -233,6 +237,12 @@ class DispersionTable(Part):
 
     def _given(self) -> list[str]:
         return [kind for kind in _KINDS if getattr(self, kind) is not None]
+
+
+def _mirrors(values: int, size: int) -> bool:
+    """Return whether so many values are all entries of a matrix whose upper triangle has `size`."""
+    rows = math.isqrt(values)
+    return rows > 1 and rows**2 == values and rows * (rows + 1) // 2 == size
 
 
 #: The keys of a dispersion that are distributions.

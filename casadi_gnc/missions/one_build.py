@@ -18,6 +18,7 @@ from casadi_gnc.missions.flying import EngineName, Progress, begin, engine_of, f
 from casadi_gnc.missions.judging import judges_of
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.parameters import Varied
+from casadi_gnc.missions.paths import entries_of
 from casadi_gnc.missions.requirements import Judge
 
 #: Samples of which every one is looked at at once.
@@ -76,14 +77,29 @@ class OneBuild:
         """Return the number of every column, (P,); arguments and errors as for `fly`."""
         row = self.varied.parameters.nominal.copy()
         for key, value in values.items():
-            places = [i for i, known in enumerate(self.keys) if known == key or known.startswith(f"{key}.")]
+            entries = self._entries(key)
+            places = list(dict.fromkeys(entries))
             if not places:
                 raise FlightError(f"{key!r} is no column of this build; {offer(key, self.keys)}")
             numbers = real_array(key, value, FlightError).ravel()
-            if numbers.size not in (1, len(places)):
+            if numbers.size == len(entries):  # a whole symmetric matrix among them
+                row[entries] = numbers
+                if (row[entries] != numbers).any():
+                    raise FlightError(f"{key!r} is a symmetric matrix; expected equal numbers in mirror entries")
+            elif numbers.size in (1, len(places)):
+                row[places] = numbers
+            else:
                 raise FlightError(f"{key!r} stands for {len(places)} numbers, and {numbers.size} are given")
-            row[places] = numbers
         return row
+
+    def _entries(self, key: str) -> list[int]:
+        """Return the column of each number that a key stands for, of mirror entries of a symmetric matrix the same."""
+        below = [i for i, known in enumerate(self.keys) if known == key or known.startswith(f"{key}.")]
+        try:
+            entries = entries_of(self.varied.nominal, key)
+        except FlightError:  # a table, whose columns alone are meant
+            return below
+        return [self.keys.index(one) for one in entries if one in self.keys]
 
     def fly_row(
         self,

@@ -2,7 +2,8 @@
 
 A path is `truth.inertia_factor`, `initial.rate_rad_per_s.2`, `spacecraft.thrusters.positions_m.3.1` or
 `scheme.observer_pinv.law.rate_gain`; items of lists have their number from 1, and a `*` stands for every item, of a
-table for every key that has numbers.
+table for every key that has numbers. An entry of a symmetric matrix and its mirror image are one number, which has the
+path of the upper triangle: `spacecraft.inertia_kg_m2.2.1` is `spacecraft.inertia_kg_m2.1.2`.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from casadi_gnc.errors import FlightError, ProblemError
 from casadi_gnc.laws import Law, gains_of
 from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.tables.complaints import near_key, sentences
+from casadi_gnc.tables.matrices import symmetric_keys
 from casadi_gnc.tables.part import Part, own_tables
 
 if TYPE_CHECKING:
@@ -36,7 +38,12 @@ _SHAPES = {
 
 
 def numbers_of(mission: Mission, key: str) -> list[str]:
-    """Return the whole path of every number that a key of a mission of one scheme stands for, in order."""
+    """Return the whole path of every number that a key of a mission of one scheme stands for, each once, in order."""
+    return list(dict.fromkeys(entries_of(mission, key)))
+
+
+def entries_of(mission: Mission, key: str) -> list[str]:
+    """Return the same with the path of a number as often as it stands there: in a symmetric matrix twice."""
     root, *rest = key.split(".")
     if root in _SHAPES:
         raise FlightError(f"{key!r} cannot be a column: {_SHAPES[root]}")
@@ -52,9 +59,9 @@ def _root(mission: Mission, root: str, key: str) -> Any:
     if root == "scheme":
         return {each.name: {"law": each.law, **_limits(each.keys)} for each in mission.schemes}
     if root == "spacecraft":
-        return {name: getattr(craft, name) for name in type(craft).model_fields if name not in own}
+        return {name: part for name, part in _fields(craft).items() if name not in own}
     if root in own:
-        return getattr(craft, root)
+        return _fields(craft)[root]
     raise FlightError(f"{key!r} leads nowhere: the mission has no {root!r}{near_key(root, [*own, *_ROOTS])}")
 
 
@@ -68,7 +75,9 @@ def _limits(keys: Part | None) -> dict[str, Any]:
 
 def _leaves(at: Any, rest: list[str], done: tuple[str, ...], key: str) -> Iterator[str]:
     """Yield the paths of the numbers below a place; a `*` stands for every item there."""
-    if rest:
+    if isinstance(at, _Mirrored):
+        yield from map(_upper, _leaves(list(at), rest, done, key))
+    elif rest:
         parts = _parts(at)
         if rest[0] == "*":
             if not parts:
@@ -92,6 +101,25 @@ def _leaves(at: Any, rest: list[str], done: tuple[str, ...], key: str) -> Iterat
         raise FlightError(f"{key!r} leads to {'.'.join(done)}, which is no number and no list of numbers")
 
 
+class _Mirrored(list):
+    """Rows of a symmetric matrix."""
+
+
+def _upper(path: str) -> str:
+    """Return the path of an entry of a symmetric matrix, or of its mirror image, in the upper triangle."""
+    *above, row, column = path.split(".")
+    return ".".join([*above, *sorted((row, column), key=int)])
+
+
+def _fields(part: Part) -> dict[str, Any]:
+    """Return the keys of a table, symmetric matrices as such."""
+    mirrored = symmetric_keys(type(part))
+    own = {name: getattr(part, name) for name in type(part).model_fields}
+    return {
+        name: _Mirrored(each) if name in mirrored and isinstance(each, list) else each for name, each in own.items()
+    }
+
+
 def _holds_numbers(at: Any) -> bool:
     """Return whether a key of a table has a number or numbers: words, choices and what is left out have none."""
     if isinstance(at, (list, tuple)):
@@ -102,7 +130,7 @@ def _holds_numbers(at: Any) -> bool:
 def _parts(at: Any) -> dict[str, Any]:
     """Return what a path may go on to: fields, gains, and items by their number from 1."""
     if isinstance(at, Part):
-        return {name: getattr(at, name) for name in type(at).model_fields}
+        return _fields(at)
     if isinstance(at, dict):
         return at
     if isinstance(at, (list, tuple)):
@@ -155,6 +183,9 @@ def _put(at: Any, values: dict[Path, Any]) -> Any:
     for path, value in values.items():
         below.setdefault(path[0], {})[path[1:]] = value
     if isinstance(at, Part):
+        for name in symmetric_keys(type(at)) & below.keys():
+            mirrors = {(*path[:-2], path[-1], path[-2]): each for path, each in below[name].items() if len(path) == 2}
+            below[name] = {**mirrors, **below[name]}
         new = {str(name): _put(getattr(at, str(name)), inner) for name, inner in below.items()}
         if all(is_number(value) for value in values.values()):
             given = {**{name: getattr(at, name) for name in type(at).model_fields}, **new}

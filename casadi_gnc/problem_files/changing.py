@@ -3,7 +3,7 @@
 A path is written with dots, `truth.inertia_factor`; an item of a list of tables is taken by its name,
 `scheme.funnel_robust.law.attitude_gain`, or by its number from 1, `fault.2.bias_N_m`; `*` stands for
 every item, `scheme.*.force_limit_N.*`. Where a file is silent and its schema has a default, the default is what
-is changed.
+is changed. In a symmetric matrix the mirror image of an entry follows it, unless it is changed too.
 """
 
 from __future__ import annotations
@@ -19,7 +19,11 @@ from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.problem_files.mission_tables import MissionTables
 from casadi_gnc.tables.complaints import near_key
+from casadi_gnc.tables.matrices import symmetric_keys
 from casadi_gnc.tables.part import own_tables
+
+#: Rows of a symmetric matrix, and which entry of them was changed.
+Entry = tuple[list[Any], int, int]
 
 
 def changed(data: dict[str, Any], changes: Mapping[str, Any], craft: type[Craft]) -> dict[str, Any]:
@@ -37,19 +41,33 @@ def changed(data: dict[str, Any], changes: Mapping[str, Any], craft: type[Craft]
         For a path that leads nowhere; the message says where it ends and what there is.
     """
     result = copy.deepcopy(data)
+    entries: list[Entry] = []
     for path, value in changes.items():
-        _put(result, path.split("."), value, path, (), craft)
+        _put(result, path.split("."), value, path, (), craft, entries)
+    given = {(id(rows), i, j) for rows, i, j in entries}
+    for rows, i, j in entries:
+        if (id(rows), j, i) not in given and j < len(rows) and isinstance(rows[j], list) and i < len(rows[j]):
+            rows[j][i] = rows[i][j]
     return result
 
 
-def _put(at: Any, parts: list[str], value: Any, path: str, done: tuple[str, ...], craft: type[Craft]) -> None:
-    """Set, in place, what the parts of a path lead to."""
+def _put(
+    at: Any, parts: list[str], value: Any, path: str, done: tuple[str, ...], craft: type[Craft], entries: list[Entry]
+) -> None:
+    """Set, in place, what the parts of a path lead to; note entries of symmetric matrices."""
     part, rest = parts[0], parts[1:]
     for key in _keys(at, part, path, done, rest, craft):
-        if rest:
-            _put(at[key], rest, value, path, (*done, part), craft)
-        else:
+        if not rest:
             at[key] = copy.deepcopy(value)
+        elif len(rest) <= 2 and isinstance(at[key], list) and part in _symmetric(craft, done):
+            rows = at[key]
+            _put(rows, rest, value, path, (*done, part), craft, entries)
+            for i in _keys(rows, rest[0], path, (*done, part), rest[1:], craft):
+                row = rows[i] if isinstance(rows[i], list) else []
+                columns = _keys(row, rest[1], path, (*done, part, rest[0]), [], craft) if rest[1:] else range(len(row))
+                entries += [(rows, i, j) for j in columns]
+        else:
+            _put(at[key], rest, value, path, (*done, part), craft, entries)
 
 
 def _keys(at: Any, part: str, path: str, done: tuple[str, ...], rest: list[str], craft: type[Craft]) -> list[Any]:
@@ -87,22 +105,33 @@ def _number(items: list[Any], part: str, path: str, done: tuple[str, ...]) -> in
 def _schema(craft: type[Craft], done: tuple[str, ...]) -> dict[str, Any]:
     """Return the keys that a table may have with their defaults as a file would write them; empty where unknown."""
     own = own_tables(craft)
-    top = {**MissionTables.model_fields, **{name: craft.model_fields[name] for name in own}}
     if not done:
+        top = {**MissionTables.model_fields, **{name: craft.model_fields[name] for name in own}}
         return {name: _written(field) for name, field in top.items()}
+    fields = {name: field for model in _tables(craft, done) for name, field in model.model_fields.items()}
+    return {name: _written(field) for name, field in fields.items() if done != ("spacecraft",) or name not in own}
+
+
+def _symmetric(craft: type[Craft], done: tuple[str, ...]) -> set[str]:
+    """Return the keys of a table that are symmetric matrices."""
+    return {name for model in (_tables(craft, done) if done else []) for name in symmetric_keys(model)}
+
+
+def _tables(craft: type[Craft], done: tuple[str, ...]) -> list[type[BaseModel]]:
+    """Return the models, of which one is that of the table where a path has come to; none where unknown."""
+    own = own_tables(craft)
+    if done == ("spacecraft",):
+        return [craft]
     if done[0] == "spacecraft":
         fields = {name: field for name, field in craft.model_fields.items() if name not in own}
-        models: list[type[BaseModel]] = []
         done = done[1:]
-        if not done:
-            return {name: _written(field) for name, field in fields.items()}
-        models = _models(fields[done[0]].annotation) if done[0] in fields else []
     else:
-        models = _models(top[done[0]].annotation) if done[0] in top else []
+        fields = {**MissionTables.model_fields, **{name: craft.model_fields[name] for name in own}}
+    models = _models(fields[done[0]].annotation) if done[0] in fields else []
     for part in done[1:]:
         inner = [model.model_fields[part] for model in models if part in model.model_fields]
         models = [found for field in inner for found in _models(field.annotation)] or models
-    return {name: _written(field) for model in models for name, field in model.model_fields.items()}
+    return models
 
 
 def _models(annotation: Any) -> list[type[BaseModel]]:

@@ -4,13 +4,14 @@ from casadi_gnc.tables.allocation import BackEndName, Pinv, Robust
 from casadi_gnc.tables.attitude import AttitudeStart
 from casadi_gnc.tables.disturbances import OrbitalPush, OrbitAndTorque, OuterForce
 from casadi_gnc.tables.limits import ForceAndTorqueLimits
-from casadi_gnc.tables.matrices import Inertia
+from casadi_gnc.tables.matrices import SYMMETRIC, Inertia
 from casadi_gnc.tables.orientation import Orientation
 from casadi_gnc.tables.part import Matrix, MisfitError, NonNegative, Part, Positive, Rows, Table, Vector, table
 from casadi_gnc.tables.thrusters import Engine, MountedThrusters, Thrusters
 from casadi_gnc.tables.wheels import Wheels
 
 __all__ = [
+    "SYMMETRIC",
     "AttitudeStart",
     "BackEndName",
     "Engine",

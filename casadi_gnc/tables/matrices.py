@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from functools import cache
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 import numpy as np
-from pydantic import AfterValidator
+from pydantic import AfterValidator, BaseModel
 
 from casadi_gnc.mathematics.exact import is_number
 from casadi_gnc.tables.part import Matrix
@@ -61,5 +63,28 @@ def check_unit(vector: list[float], *, prefix: str = "") -> list[float]:
     return vector
 
 
+class Symmetric:
+    """Mark the type of a key as a symmetric matrix: an entry and its mirror image are one number."""
+
+
+#: The mark, for `Annotated`.
+SYMMETRIC = Symmetric()
 #: An inertia matrix that a body can have, [kg m^2].
-Inertia = Annotated[Matrix, AfterValidator(check_inertia)]
+Inertia = Annotated[Matrix, SYMMETRIC, AfterValidator(check_inertia)]
+
+
+@cache
+def symmetric_keys(model: type[BaseModel]) -> frozenset[str]:
+    """Return the keys of a table that are symmetric matrices."""
+    return frozenset(
+        name
+        for name, field in model.model_fields.items()
+        if any(isinstance(mark, Symmetric) for mark in field.metadata) or _is_marked(field.annotation)
+    )
+
+
+def _is_marked(annotation: Any) -> bool:
+    """Return whether a type, or one of the alternatives of a union, has the mark."""
+    if get_origin(annotation) in (Annotated, Union, UnionType):
+        return any(isinstance(each, Symmetric) or _is_marked(each) for each in get_args(annotation))
+    return False

@@ -112,6 +112,7 @@ def test_what_cannot_be_meant_is_told_with_its_place(text):
 MISFITS = {
     ("direction = {}", 4): ("gives 3 numbers; the key 'truth.*' stands for 4", ("direction",)),
     ("choice = { values = [[1, 2], [3, 4]] }", 3): ("gives 2 numbers", ("choice",)),
+    ("choice = { values = [[1, 0, 0, 0, 1, 0, 0, 0, 1]] }", 6): ("of a symmetric matrix give mirror", ("choice",)),
     ('rotation = { form = "quaternion_scalar_last" }', 3): ("gives 4 numbers", ("rotation",)),
     ('table = { file = "cases.csv" }', 3): ("gives 2 numbers", ("table",)),
     ('table = { file = "cases.csv", columns = ["c"] }', 1): ("has no column 'c'; it has a, b", ("table", "columns")),

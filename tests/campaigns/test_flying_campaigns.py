@@ -177,11 +177,12 @@ def test_cases_that_no_craft_can_have_are_counted_and_not_redrawn():
 
 def test_an_indefinite_inertia_is_refused():
     varied = vary(casadi_gnc.load("sun2018/circular_orbit"), ["spacecraft.inertia_kg_m2"])
-    values = np.tile(varied.parameters.nominal, (2, 1))
-    values[1, [1, 3]] = 1e6  # off the diagonal
+    values = np.tile(varied.parameters.nominal, (8, 1))
+    values[1:7] += np.diag([20.0, 20.0, 10.0, 20.0, 10.0, 10.0])  # one entry each, its mirror image with it
+    values[7, 1] = 1e6  # off the diagonal
     told = varied.refusals(values)
-    assert told[0] == ""
-    assert "positive definite" in told[1]
+    assert told[:7] == [""] * 7
+    assert "positive definite" in told[7]
 
 
 def test_a_start_beyond_what_sensors_tell_is_refused():

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import casadi_gnc
 from casadi_gnc.errors import FlightError, GncError
 from casadi_gnc.missions.flying import fly
-from casadi_gnc.missions.one_build import fly_case
+from casadi_gnc.missions.one_build import OneBuild, fly_case
 from casadi_gnc.missions.parameters import vary
+from casadi_gnc.missions.paths import changed, number_at, numbers_of
 
 #: Keys of each kind, by mission: truth, environment, start, orbit, sensors, faults, gains.
 KEYS = {
@@ -42,6 +45,7 @@ KEYS = {
             *("sensor.1.bias_rad_per_s", "sensor.1.angle_random_walk_rad_per_sqrt_s", "sensor.1.range_rad_per_s"),
             *("sensor.2.dropout", "sensor.2.across_rad", "sensor.2.about_rad", "sensor.2.max_rate_rad_per_s"),
             *("estimator.attitude_deviation_deg", "estimator.bias_deviation_deg_per_s", "estimator.gate"),
+            "spacecraft.inertia_kg_m2.2.1",
         ],
     ),
 }
@@ -92,8 +96,6 @@ def test_at_their_nominal_values_columns_fly_like_the_numbers_to_rounding(varied
 def test_other_values_fly_like_a_mission_that_has_them_as_numbers(varied, name):
     one = varied[name]
     values = one.parameters.nominal * (1 + 1e-3 * np.sin(np.arange(one.parameters.size) + 1.0))
-    if name == "sun2018/circular_orbit":  # a matrix stays symmetric
-        values = one.parameters.nominal * 1.001
     columns = fly_case(one, values, one.nominal.noise.seed, decimation=1)
     assert apart(one, fly(one.at(values), decimation=1), columns) < 1e-6
     assert apart(one, fly(one.nominal, decimation=1), columns) > 1e-5
@@ -175,6 +177,55 @@ def test_a_star_stands_for_the_numbers_that_a_table_gives():
 def test_one_number_cannot_follow_two_keys():
     with pytest.raises(FlightError, match=r"'initial\.mrp\.1' is given by two keys"):
         vary(casadi_gnc.load("huang2020/detumble"), ["initial.mrp.1", "initial.*"])
+
+
+@pytest.mark.parametrize(
+    ("entry", "named"),
+    [
+        ("", "11 12 13 22 23 33"),
+        (".*.*", "11 12 13 22 23 33"),
+        (".1.2", "12"),
+        (".2.1", "12"),
+        (".3", "13 23 33"),
+        (".*.2", "12 22 23"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("mission", "key"),
+    [
+        ("sun2018/circular_orbit", "spacecraft.inertia_kg_m2"),
+        ("sun2018/circular_orbit", "target.inertia_kg_m2"),
+        ("tao2019/case1", "believed.inertia_kg_m2"),
+        ("satellites/earth_pointing", "spacecraft.inertia_kg_m2"),
+    ],
+)
+def test_an_entry_of_an_inertia_and_its_mirror_image_are_one_number(mission, key, entry, named):
+    one = casadi_gnc.load(mission)
+    one = one.with_scheme(one.schemes[0].name)
+    keys = numbers_of(one, f"{key}{entry}")
+    assert keys == [f"{key}.{row}.{column}" for row, column in named.split()]
+    values = {each: number_at(one, each) + 0.01 * i for i, each in enumerate(keys, 1)}
+    craft = changed(one, values)[0]  # which refuses what is not symmetric
+    table: Any = craft if key.startswith("spacecraft") else getattr(craft, key.split(".")[0])
+    for each, value in values.items():
+        row, column = (int(part) - 1 for part in each.split(".")[-2:])
+        assert table.inertia_kg_m2[row][column] == table.inertia_kg_m2[column][row] == value
+
+
+def test_mirror_entries_by_two_keys_are_given_twice():
+    keys = ["spacecraft.inertia_kg_m2.1.2", "spacecraft.inertia_kg_m2.2.1"]
+    with pytest.raises(FlightError, match=r"'spacecraft\.inertia_kg_m2\.1\.2' is given by two keys"):
+        vary(casadi_gnc.load("satellites/earth_pointing"), keys, "mrp")
+
+
+def test_a_build_takes_a_whole_inertia_or_an_entry_by_either_name():
+    one = vary(casadi_gnc.load("sun2018/circular_orbit"), ["spacecraft.inertia_kg_m2"])
+    build, whole = OneBuild(one), np.array([[600.0, -20.0, -50.0], [-20.0, 420.0, -25.0], [-50.0, -25.0, 260.0]])
+    assert (build.row({"spacecraft.inertia_kg_m2": whole}) == whole[np.triu_indices(3)]).all()
+    assert build.row({"spacecraft.inertia_kg_m2.3.1": -49.0})[2] == -49.0
+    whole[2, 0] = -51.0
+    with pytest.raises(FlightError, match="expected equal numbers in mirror entries"):
+        build.row({"spacecraft.inertia_kg_m2": whole})
 
 
 def test_values_that_no_craft_can_have_are_refused_as_a_file_would_refuse_them():

@@ -50,6 +50,13 @@ def lines_apart(before, after):
             {"scheme.pd_pinv.allocation.note": "x"},
             ['- allocation = { method = "pinv" }', '+ allocation = { note = "x", method = "pinv" }'],
         ),
+        (  # the mirror entry follows
+            {"spacecraft.inertia_kg_m2.2.1": 0.01},
+            [
+                "- inertia_kg_m2 = [[0.49019, 0.0, 0.0], [0.0, 1.2089, 0.0], [0.0, 0.0, 1.2916]]",
+                "+ inertia_kg_m2 = [[0.49019, 0.01, 0.0], [0.01, 1.2089, 0.0], [0.0, 0.0, 1.2916]]",
+            ],
+        ),
         ({"noise.seed": 3}, ["+ ", "+ [noise]", "+ seed = 3"]),
         ({"timing.plant_substeps": 2}, ["+ plant_substeps = 2"]),
     ],
@@ -60,6 +67,28 @@ def test_only_what_changes_is_written(changes, apart):
     text = rewritten(document, changes, craft)
     assert changed(tomllib.loads(text), {}, craft) == changed(tomllib.loads(text), changes, craft)
     assert lines_apart(document.text, text) == apart
+
+
+@pytest.mark.parametrize(
+    ("changes", "rows"),
+    [
+        ({"1.2": 5.0}, [[1, 5.0, 3], [5.0, 4, 5], [3, 5, 6]]),
+        ({"3.1": 5.0, "3.3": 7.0}, [[1, 2, 5.0], [2, 4, 5], [5.0, 5, 7.0]]),
+        ({"2": [7, 8, 9]}, [[1, 7, 3], [7, 8, 9], [3, 9, 6]]),
+        ({"*.3": 0}, [[1, 2, 0], [2, 4, 0], [0, 0, 0]]),
+        ({"1.2": 5.0, "2.1": 6.0}, [[1, 5.0, 3], [6.0, 4, 5], [3, 5, 6]]),  # which the table refuses
+        ({"1": [7, 8], "3.2": 0}, [[7, 8], [8, 4, 0], [3, 0, 6]]),
+    ],
+)
+@pytest.mark.parametrize("key", ["believed.inertia_kg_m2", "dispersion.1.correlated.covariance"])
+def test_an_entry_of_a_symmetric_matrix_takes_its_mirror_image_along(key, changes, rows):
+    before = [[1, 2, 3], [2, 4, 5], [3, 5, 6]]
+    data = {"believed": {"inertia_kg_m2": before}, "dispersion": [{"correlated": {"covariance": before}}]}
+    craft = craft_of(read("tao2019/case1"))
+    after = changed(data, {f"{key}.{entry}": value for entry, value in changes.items()}, craft)
+    table = after["believed"] if key.startswith("believed") else after["dispersion"][0]["correlated"]
+    assert table[key.split(".")[-1]] == rows
+    assert before == [[1, 2, 3], [2, 4, 5], [3, 5, 6]]
 
 
 def test_a_value_of_several_lines_with_comments_and_quotes():
