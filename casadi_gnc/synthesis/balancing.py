@@ -26,7 +26,7 @@ def balanced(A: np.ndarray, B: np.ndarray, E: np.ndarray, C: np.ndarray, D: np.n
     -----
     Where nothing stabilises the plant T is diagonal, of powers of two: zeros of the data stay, and proofs hang on them.
     """
-    units = _units(A)
+    units = _units(A, B, E, C, D)
     a, b, e, c = A / units[:, None] * units, B / units[:, None], E / units[:, None], C * units
     best = _riccati(a, b, e, c, D, np.inf)
     if best is None:
@@ -70,12 +70,20 @@ def _root(P: np.ndarray) -> np.ndarray:
     return np.linalg.cholesky(P).T
 
 
-def _units(A: np.ndarray) -> np.ndarray:
-    """Return units of the states, powers of two, (n,), that bring rows and columns of A to like size."""
+def _units(A: np.ndarray, B: np.ndarray, E: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
+    """Return units of the states, powers of two, (n,), that bring what enters each and what leaves it to like size.
+
+    The inputs and outputs, whose units are those of the norm, close the loop: a chain of integrators has no units in A.
+    """
     from scipy.linalg import matrix_balance
 
-    _, (units, _) = matrix_balance(A, permute=False, separate=True)
-    return np.asarray(units, dtype=float)
+    n, inputs, outputs = len(A), B.shape[1] + E.shape[1], len(C)
+    loop = np.zeros((n + inputs + outputs, n + inputs + outputs))
+    loop[:n, : n + inputs] = np.hstack([A, B, E])
+    loop[n : n + inputs, n + inputs :] = 1.0
+    loop[n + inputs :, : n + B.shape[1]] = np.hstack([C, D])
+    _, (units, _) = matrix_balance(loop, permute=False, separate=True)
+    return np.asarray(units[:n], dtype=float)
 
 
 def _definite(weight: np.ndarray) -> np.ndarray:
@@ -90,7 +98,7 @@ def covariance_root(A: np.ndarray, B: np.ndarray, E: np.ndarray, C: np.ndarray, 
     """
     from scipy.linalg import solve_continuous_lyapunov
 
-    units = _units(A)
+    units = _units(A, B, E, C, D)
     a, b, e, c = A / units[:, None] * units, B / units[:, None], E / units[:, None], C * units
     P = _riccati(a, b, e, c, D, np.inf)
     if P is None:
@@ -106,7 +114,7 @@ def covariance_root(A: np.ndarray, B: np.ndarray, E: np.ndarray, C: np.ndarray, 
 
 def regulator(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> np.ndarray:
     """Return K, (m, n), of the linear-quadratic regulator u = -K x for z = C x + D u; zeros where there is none."""
-    units = _units(A)
+    units = _units(A, B, np.zeros((len(A), 0)), C, D)
     a, b, c = A / units[:, None] * units, B / units[:, None], C * units
     P = _riccati(a, b, np.zeros((len(a), 1)), c, D, np.inf)
     if P is None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 from casadi_gnc.errors import SynthesisError
-from casadi_gnc.synthesis import Lmis, LmiStatus
+from casadi_gnc.synthesis import Lmis, LmiStatus, state_feedback
 from casadi_gnc.synthesis.backends import scs_
 from casadi_gnc.synthesis.certificate import check, values
 from casadi_gnc.synthesis.conic import ConicData
@@ -40,6 +40,26 @@ def test_rows_apart_change_nothing(backend, decades, margin):
     assert np.trace(answer["P"]) == pytest.approx(np.trace(truth), rel=1e-4)
     (found,) = answer.checks
     assert found.smallest - found.allowance >= 0.5 * margin * 10.0 ** (-2 * decades)
+
+
+@pytest.mark.parametrize("backend", ["clarabel", "barrier"])
+def test_units_of_states_change_no_norm(backend):
+    """A cart with a pendulum, its states in other units: the same loop, so the same certified norm.
+
+    Two of its states are integrals of the others, so its matrix alone does not tell their units.
+    """
+    whole = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [0, -0.7, 0, 0], [0, 15.8, 0, 0.0]])
+    push = np.array([[0.0], [0], [0.98], [-1.46]])
+    norms = []
+    for spread in (1.0, 1e8, 1e18):
+        units = spread ** np.array([-0.5, 0.5, -0.25, 0.25])  # x = units * x of the cart
+        found = state_feedback(
+            whole * units[:, None] / units, push * units[:, None], np.diag(units), np.eye(5, 4) / units,
+            np.eye(5)[:, 4:], margin=1e-7, backend=backend,
+        )  # fmt: skip
+        assert found.is_certified, (spread, found.status)
+        norms.append(found.promised)
+    assert norms == pytest.approx([norms[0]] * 3, rel=1e-5)
 
 
 def test_the_certificate_of_rows_apart_is_that_of_many_digits():
