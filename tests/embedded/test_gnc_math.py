@@ -105,3 +105,15 @@ def test_odd_and_even_functions_are_symmetric_bit_for_bit(library: Library, p: P
     for name in ("cos", "cosh"):
         (x,) = arguments(name, p, 2000)
         np.testing.assert_array_equal(library(name, p, -x), library(name, p, x))
+
+
+@pytest.mark.parametrize("p", PRECISIONS, **by_name)
+def test_tanh_never_falls_where_its_argument_rises(library: Library, p: Precision):
+    """It starts from the nearest of a row of points: here on both sides of where two of them meet, and between."""
+    borders = neighbours(p, np.arange(1, 250) * 0.078125)
+    between = np.random.default_rng(3).uniform(0, 20, 4000).astype(p.dtype).view(p.bits)
+    runs = (between[:, None] + np.arange(8, dtype=p.bits)).view(p.dtype)  # eight numbers in a row
+    for x in (np.sort(np.concatenate([borders, runs.ravel()])), np.sort(runs.ravel())[::-1] * p.dtype(-1)):
+        found = library("tanh", p, x)
+        assert np.all(np.diff(found) >= 0)
+        assert np.abs(found).max() == 1
