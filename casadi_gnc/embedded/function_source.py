@@ -13,6 +13,7 @@ from casadi_gnc.embedded.source import numbers
 from casadi_gnc.signals import Layout
 from casadi_gnc.system import assets
 from casadi_gnc.system.templates import template
+from casadi_gnc.system.text import c_comment
 
 #: Up to so many numbers are tested one by one, more by a loop.
 _SHORT = 4
@@ -27,7 +28,7 @@ def function_files(own: FlightFunction, options: Options) -> dict[str, str]:
         For what has no C form: the node, where it comes from, and what to do.
     """
     parts = Parts(options.maths, options.real, options.name.upper())
-    callee = parts.function(own.function)
+    callee = parts.function(own.function, titles=_titles(own))
     about = common(own, options)
     source = template("function_source.c.j2").render(
         **about,
@@ -74,6 +75,19 @@ def _members(own: FlightFunction, layout: Layout) -> list[dict[str, str]]:
         note = [signal.unit or "-", own.shape(signal.name), own.notes.get(signal.name, "")]
         rows.append({"declaration": declaration(signal), "note": ", ".join(part for part in note if part)})
     return rows
+
+
+def _titles(own: FlightFunction) -> dict[str, str]:
+    """Return of each result what it is, as the step's comments say it."""
+    after = {output: name for name, output in own.pairs.items()}
+    found = {}
+    for name in own.function.name_out():
+        port = after.get(name, name)
+        rows, columns = own.function.size_out(name)
+        about = [f"the next {port}" if name in after else own.notes.get(name, ""), f"({rows}, {columns})"]
+        about += [f"[{unit}]"] if (unit := own.units.get(port, "")) else []
+        found[name] = c_comment(f"{name}: {', '.join(part for part in about if part)}")
+    return found
 
 
 def _finite(layout: Layout, owner: str) -> list[str]:

@@ -6,6 +6,7 @@ Each is printed once, however often it is called, under a name of its own.
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import casadi as ca
@@ -13,8 +14,9 @@ import numpy as np
 
 from casadi_gnc.embedded import programs
 from casadi_gnc.embedded.pieces import Piece, node_piece, table_piece
+from casadi_gnc.embedded.printer import comment
 from casadi_gnc.embedded.program_text import declare, print_program
-from casadi_gnc.embedded.programs import Callee, Port
+from casadi_gnc.embedded.programs import Callee, Port, Program
 from casadi_gnc.embedded.scalars import Math, Real, c_constant
 from casadi_gnc.embedded.tables import read_table
 from casadi_gnc.errors import PrinterError
@@ -62,8 +64,10 @@ class Parts:
         )
         return "\n".join([helpers, *self.texts])
 
-    def function(self, function: ca.Function, place: str = "") -> Callee:
+    def function(self, function: ca.Function, place: str = "", titles: Mapping[str, str] | None = None) -> Callee:
         """Print a function, unless it was, and all that it calls; return its name in C.
+
+        `titles` say of its results what they are; by default their names do.
 
         Raises
         ------
@@ -74,11 +78,11 @@ class Parts:
             if known.__hash__() == function.__hash__():
                 return callee
         place = f"{place}, {function.name()}" if place else function.name()
-        callee = self._made(function, place)
+        callee = self._made(function, place, titles)
         self._functions.append((function, callee))
         return callee
 
-    def _made(self, function: ca.Function, place: str) -> Callee:
+    def _made(self, function: ca.Function, place: str, titles: Mapping[str, str] | None) -> Callee:
         kind = function.class_name()
         if kind == "Switch":
             return self._branches(function, place)
@@ -90,7 +94,10 @@ class Parts:
             self._count(function)
         made = programs.program(function, place, self._is_kept, self._printed)
         name = self._name(function.name())
-        self.texts.append(print_program(name, made, maths=self.maths, real=self.real))
+        said = titles or {one: one for one in function.name_out()}
+        results = {port.name: said.get(one, one) for port, one in zip(made.outputs, function.name_out(), strict=True)}
+        text = print_program(name, made, maths=self.maths, real=self.real, titles=results)
+        self.texts.append("\n".join([*comment(_ports(function, made), again=False), text]))
         return Callee(name, made.asks)
 
     def _count(self, function: ca.Function) -> None:
@@ -174,3 +181,9 @@ class Parts:
         callee = Callee(self._name(name), asks)
         self.texts.append("\n".join([declare(callee.name, inputs, outputs, asks), "{", *lines, "}", ""]))
         return callee
+
+
+def _ports(function: ca.Function, made: Program) -> str:
+    """Return which port of a function is which argument of its C."""
+    ports = [*zip(made.inputs, function.name_in(), strict=True), *zip(made.outputs, function.name_out(), strict=True)]
+    return f"{function.name()}: " + ", ".join(f"{port.name} is {name}" for port, name in ports)

@@ -65,16 +65,14 @@ def print_function(
     nodes, results = graph(function, places)
     zero, one = c_constant(0.0, real), c_constant(1.0, real)
     used, compared = uses(nodes, [node for _, node in results])
-    blocks = _blocks(nodes, results, titles or {})
+    blocks = blocks_of(nodes, results, titles or {})
     body, block, told = [], "", set()
     for k, node in enumerate(nodes):
         if k not in used:
             continue
         if blocks.get(k, block) != block:
             block = blocks[k]
-            lines = wrap(block if block not in told else f"{block.partition(':')[0]} again", 112)
-            body += [f"    /* {line}" if i == 0 else f"     * {line}" for i, line in enumerate(lines)]
-            body[-1] += " */"
+            body += [f"    {line}" for line in comment(block, again=block in told)]
             told.add(block)
         if node.code == ca.OP_CONST:
             # A bound beyond the largest float is met by every finite float and by no infinite one.
@@ -93,8 +91,8 @@ def print_function(
             if shared is not None and node.is_flag:
                 text = _as_number(node.code, text, flags, real)
             text = text.format(*(f"a{i}" for i in node.operands))
-        dust = _dust(node.number) if titles is not None and node.code == ca.OP_CONST else ""
-        body.append(f"    const {flag if node.is_flag and shared is None else 'gnc_real'} a{k} = {text};{dust}")
+        said = dust(node.number) if titles is not None and node.code == ca.OP_CONST else ""
+        body.append(f"    const {flag if node.is_flag and shared is None else 'gnc_real'} a{k} = {text};{said}")
     as_number = f" ? {one} : {zero}"
     stores = [f"    {place} = a{k}{as_number if nodes[k].is_flag and shared is None else ''};" for place, k in results]
     unused = []
@@ -111,7 +109,7 @@ def print_function(
     return "\n".join([head, loop[0], *unused, *loop[1:], *inner, "    }", "}", ""])
 
 
-def _blocks(nodes: list[Node], results: list[tuple[str, int]], titles: Mapping[str, str]) -> dict[int, str]:
+def blocks_of(nodes: Sequence[Node], results: Sequence[tuple[str, int]], titles: Mapping[str, str]) -> dict[int, str]:
     """Return for each scalar the title of the first result that needs it."""
     found: dict[int, str] = {}
     for place, node in results:
@@ -124,7 +122,13 @@ def _blocks(nodes: list[Node], results: list[tuple[str, int]], titles: Mapping[s
     return found
 
 
-def _dust(number: float) -> str:
+def comment(block: str, *, again: bool) -> list[str]:
+    """Return the lines of a comment with the title of a block, of its name alone where it goes on."""
+    lines = wrap(f"{block.partition(':')[0]} again" if again else block, 112)
+    return [f"{'/*' if i == 0 else ' *'} {line}{' */' if i == len(lines) - 1 else ''}" for i, line in enumerate(lines)]
+
+
+def dust(number: float) -> str:
     """Return a comment on a constant that arithmetic left next to a short number, or next to zero; "" for others."""
     short = float(f"{number:.9g}")
     if number != short and abs(number - short) <= 8.0 * math.ulp(short):

@@ -9,10 +9,11 @@ from __future__ import annotations
 import heapq
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import casadi as ca
 
+from casadi_gnc.embedded.printer import blocks_of, comment, dust
 from casadi_gnc.embedded.program_order import Copy, Item, Order, Store
 from casadi_gnc.embedded.programs import Call, Port, Program
 from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Real, c_constant, expression
@@ -32,7 +33,7 @@ def declare(name: str, inputs: Iterable[Port], outputs: Iterable[Port], asks: bo
 class _Printer:
     """Print one program."""
 
-    def __init__(self, name: str, program: Program, maths: Math, real: Real) -> None:
+    def __init__(self, name: str, program: Program, maths: Math, real: Real, titles: Mapping[str, str]) -> None:
         self._name, self._program = name, program
         self._maths: Math = maths
         self._real: Real = real
@@ -40,6 +41,9 @@ class _Printer:
         self._zero, self._one = c_constant(0.0, real), c_constant(1.0, real)
         self._order = Order(program)
         self._numbers = {call: i for i, call in enumerate(program.calls)}
+        stores = [(port, node) for port, _, node in program.stores]
+        self._blocks, self._told = blocks_of(self._nodes, stores, titles), set[str]()
+        self._titles = titles
 
     # ---- The text of a statement ---------------------------------------------------------------------
 
@@ -56,15 +60,15 @@ class _Printer:
 
     def scalar(self, k: int, arrays: dict[str, int]) -> str:
         """Return the declaration of a scalar."""
-        node = self._nodes[k]
+        node, said = self._nodes[k], ""
         if node.code == ca.OP_CONST:
-            text = self._constant(k)
+            text, said = self._constant(k), dust(node.number) if self._titles else ""
         elif node.code == ca.OP_INPUT:
             text = _at(*self._order.place[k], arrays)
         else:
             text = expression(node.code, tuple(self._nodes[i].is_flag for i in node.operands), self._maths, self._real)
             text = text.format(*(f"a{i}" for i in node.operands))
-        return f"const {'gnc_flag' if node.is_flag else 'gnc_real'} a{k} = {text};"
+        return f"const {'gnc_flag' if node.is_flag else 'gnc_real'} a{k} = {text};{said}"
 
     def call(self, call: Call, arrays: dict[str, int]) -> list[str]:
         """Return the statements of a call; `arrays` holds the places of arrays that are part of one large one."""
@@ -91,6 +95,18 @@ class _Printer:
         if isinstance(item, Store):
             return [f"{item.target}[{item.at}] = {self._number(item.node)};"]
         return [self.scalar(item, arrays)]
+
+    def statements(self, items: Iterable[Item], arrays: dict[str, int]) -> list[str]:
+        """Return the C of items in blocks, each under the title of the result that it is computed for."""
+        lines, block = [], ""
+        for item in items:
+            title = self._blocks.get(item, block) if isinstance(item, int) else block
+            if title != block:
+                block = title
+                lines += comment(title, again=title in self._told)
+                self._told.add(title)
+            lines += self.statement(item, arrays)
+        return lines
 
     def tables(self) -> list[str]:
         """Return arguments of calls that are constants, as tables."""
@@ -123,7 +139,7 @@ class _Printer:
         head = declare(self._name, self._program.inputs, self._program.outputs, self._program.asks)
         if len(items) <= LENGTH:
             body = [f"gnc_real {port.name}[{port.size}];" for port in self.arrays()] + self.tables()
-            body += [line for item in items for line in self.statement(item, {})]
+            body += self.statements(items, {})
             return _function(head, body, self._unused("\n".join(body)))
         return self._pieces(head, items)
 
@@ -204,8 +220,7 @@ class _Printer:
                 kept = f"w[{slots[k]}]{f' != {self._zero}' if node.is_flag else ''}"
                 lines.append(f"const {'gnc_flag' if node.is_flag else 'gnc_real'} a{k} = {kept};")
         read = self._read(row) | slots.keys()
-        for item in row:
-            lines += self.statement(item, arrays) if not isinstance(item, int) or item in read else []
+        lines += self.statements([item for item in row if not isinstance(item, int) or item in read], arrays)
         return lines + [f"w[{slots[k]}] = {self._number(k)};" for k in sorted(own) if k in slots]
 
 
@@ -221,8 +236,12 @@ def _pointer(name: str, index: int, arrays: dict[str, int]) -> str:
     return f"&{_at(name, index, arrays)}"
 
 
-def print_program(name: str, program: Program, *, maths: Math = "gnc", real: Real = "double") -> str:
+def print_program(
+    name: str, program: Program, *, maths: Math = "gnc", real: Real = "double", titles: Mapping[str, str] | None = None
+) -> str:
     """Return the C text of a program: `static void name(x0, x1, ..., y0, ... [, status])`.
+
+    `titles` tell of results what they are: the operations that each is the first to need follow it as a comment.
 
     Raises
     ------
@@ -230,6 +249,6 @@ def print_program(name: str, program: Program, *, maths: Math = "gnc", real: Rea
         For an operation or a constant that has no C form.
     """
     try:
-        return _Printer(name, program, maths, real).text()
+        return _Printer(name, program, maths, real, titles or {}).text()
     except PrinterError as error:
         raise PrinterError(f"{name}: {error}") from None

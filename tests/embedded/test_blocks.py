@@ -3,9 +3,14 @@
 import dataclasses
 import re
 
+import casadi as ca
+
 import casadi_gnc
-from casadi_gnc.embedded import saving
+from casadi_gnc.embedded import programs, saving
 from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.flight_function import flight_function
+from casadi_gnc.embedded.function_source import function_files
+from casadi_gnc.embedded.program_text import print_program
 from casadi_gnc.embedded.source import render_source
 from casadi_gnc.missions.onboard import describe
 
@@ -40,3 +45,29 @@ def test_rounding_of_constants_is_shown():
     assert re.search(r"= 7\.5000000000000007e-05; /\* 7\.5e-05 and rounding \*/", text)
     assert re.search(r"e-1[78]; /\* rounding of zero, where other numbers are about 1 \*/", text)
     assert not re.search(r"= (0\.5|2\.|1000000000000\.); /\*", text)
+
+
+def test_blocks_of_a_function_are_named_by_its_results():
+    x, held = ca.MX.sym("x", 2), ca.MX.sym("held")
+    sine = ca.Function("sine", [x], [ca.if_else(x[0] > 0, ca.sin(x[1]), 7.5000000000000007e-05)], ["x"], ["y"])
+    law = ca.Function("law", [x, held], [2 * sine(x) - held, held + x[0]], ["x", "held"], ["u", "held_next"])
+    ports = {"u": {"unit": "N m", "note": "torque */ asked for"}, "held": {"unit": "rad"}}
+    own = flight_function(law, state={"held": "held_next"}, ports=ports, rate=100)
+    text = function_files(own, Options("law"))["law.c"]
+    assert "/* law: x0 is x, x1 is held, y0 is u, y1 is held_next */\nstatic void f_law(" in text
+    assert "    /* u: torque * / asked for, (1, 1), [N m] */\n    const gnc_real" in text
+    assert "    /* held_next: the next held, (1, 1), [rad] */" in text
+
+
+def test_a_long_function_has_the_same_code_with_blocks():
+    x = ca.SX.sym("x", 40)
+    made = ca.Function("long", [x], [ca.cumsum(ca.sin(ca.mtimes(x, x.T)), 0), ca.sumsqr(x)], ["x"], ["y", "z"])
+    program = programs.program(made, "long", lambda called: False, lambda function, k, place: programs.Callee(""))
+    titles = {"y0": "y: many", "y1": "z: one"}
+    text, plain = (print_program("long", program, titles=told) for told in (titles, {}))
+    assert "_part2(" in plain
+    assert "/*" not in plain
+    assert code(text) == code(plain)
+    assert "    /* y: many */" in text
+    assert "    /* y again */" in text[text.index("_part2(") :]
+    assert "    /* z: one */" in text
