@@ -82,7 +82,7 @@ def test_every_unit_refuses_for_itself(real, compiler, tmp_path):
     folder = copied(made("huang2020/slew", "funnel_robust", real), tmp_path)
     unit = generate_fmu("huang2020/slew", tmp_path / "slew.fmu", scheme="funnel_robust", real=real, name="slew")
     sources = every_unit(folder, unit)
-    assert len(sources) == 11
+    assert len(sources) == 14
     flags = {"-ffinite-math-only": "gnc_math must see NaN", "-ffast-math": "without -ffast-math"}
     if real == "float64":
         flags["-Ddouble=float"] = "doubles_must_have_64_bits_"

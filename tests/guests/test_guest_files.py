@@ -43,7 +43,7 @@ IN_THE_CODE = {
     "nothing": (COMMAND, "return None\n        " + COMMAND, "command returned nothing, expected a column of 3"),
     "no such signal": (COMMAND, "return now.angel\n        " + COMMAND, "has no attribute 'angel'\n"),
     "sizes of a product": (COMMAND, "return ca.mtimes(ca.DM.eye(4), now.angle)\n        " + COMMAND, "Matrix product with incompatible dimensions"),
-    "no form in C": (COMMAND, "return ca.erf(now.angle)\n        " + COMMAND, "NadirPid.command: operation 'erf' has no C form"),
+    "no form in C": (COMMAND, "return ca.erfinv(now.angle)\n        " + COMMAND, "NadirPid.command: operation 'erfinv' has no C form"),
     "what is not measured": (INPUTS, INPUTS.replace("gyro", "gyros"), "it reads gyros, which is not measured; there is angle, gyro"),
     "another unit": (INPUTS, INPUTS.replace('"rad/s"', '"deg/s"'), "it reads gyro in deg/s, and it is measured in rad/s"),
     "another size": (INPUTS, INPUTS.replace('"gyro", 3', '"gyro", 2'), "it reads gyro with 2 elements, and 3 are measured"),
