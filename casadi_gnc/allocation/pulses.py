@@ -131,13 +131,17 @@ class PulseModulation:
         """Return c of each actuator that makes pulses."""
         return Layout((Signal("impulse_carry", sum(each is not None for each in self.pulses), "N s"),))
 
+    def check(self, period: float) -> None:
+        """Raise `AllocationError` where an actuator makes no such pulse in a sample period [s]."""
+        for number, pulse in enumerate((each for each in self.pulses if each is not None), 1):
+            pulse.check(number, period)
+
     def __call__(self, asked: Any, carried: Any, period: float) -> tuple[Any, Any]:
         """Return what the actuators are told, (N,), and c', for what is asked of them, (N,)."""
+        self.check(period)
         told: list[Any] = [asked[i] for i in range(len(self.pulses))]
         both = enumerate(zip(self.pulses, self.most, strict=True))
         made = [(i, pulse, most) for i, (pulse, most) in both if pulse is not None]
-        for number, (_, pulse, _) in enumerate(made, 1):
-            pulse.check(number, period)
         wanted = [asked[i] * period + carried.impulse_carry[place] for place, (i, _, _) in enumerate(made)]
         widths = [pulse.width(each / most, period) for each, (_, pulse, most) in zip(wanted, made, strict=True)]
         if self.valves:

@@ -28,6 +28,10 @@ class Modulation(Protocol):
         """What is carried over from sample to sample, zero at first; it is recorded too."""
         ...
 
+    def check(self, period: float) -> None:
+        """Raise `GncError` where no such pulse can be made in a sample period [s]."""
+        ...
+
     def __call__(self, asked: Any, carried: Any, period: float) -> tuple[Any, Any]:
         """Return what the actuators are told, (N,), and what is carried over, for a sample period [s]."""
         ...

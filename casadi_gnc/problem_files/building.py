@@ -212,6 +212,8 @@ def _scheme(
         made = law(hold=timing.sample_period if timing.mode == "sampled" else 0.0, printed=frozenset(named), **given)
         if strict:
             made.check_hold()
+            if made.hold and actuation.modulation is not None:
+                actuation.modulation.check(made.hold)
     except ProblemError:
         raise
     except Exception as error:

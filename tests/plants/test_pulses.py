@@ -15,6 +15,7 @@ from casadi_gnc.errors import AllocationError, FlightError, ProblemError
 from casadi_gnc.mathematics.jumps import Timed
 from casadi_gnc.mechanics.firing import STANDARD_GRAVITY, FiringThrusters
 from casadi_gnc.missions.parameters import vary
+from casadi_gnc.problem_files.document import read
 from casadi_gnc.vehicles.satellite import part_tables, pointing_checks
 from casadi_gnc.vehicles.satellite.part_tables import ThrusterTable
 
@@ -208,6 +209,15 @@ def test_pulses_longer_than_a_period_are_refused(pulse):
     modulation = PulseModulation([pulse], [1.0])
     with pytest.raises(AllocationError, match=r"thruster 1: the .* is 0.3 s, expected 0 to the period, 0.2 s"):
         modulation(ca.DM([0.5]), modulation.memory.split(ca.DM([0.0])), PERIOD)
+
+
+def test_a_mission_of_pulses_longer_than_a_period_is_refused_and_fails_the_check(tmp_path):
+    own, shipped = tmp_path / "long.toml", read(PULSES).path.read_text(encoding="utf-8")
+    own.write_text(shipped.replace("least_on_s = 0.02", "least_on_s = 0.5"))
+    with pytest.raises(ProblemError, match=r"thruster 1: the least width is 0.5 s, expected 0 to the period, 0.2 s"):
+        casadi_gnc.load(own)
+    (found,) = [each for each in casadi_gnc.check(own) if each.name == "sampling.pulse_width"]
+    assert (found.verdict, found.value, found.limit) == ("fail", 0.5, PERIOD)
 
 
 @pytest.mark.slow

@@ -39,6 +39,18 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[
             "Raise timing.plant_substeps, or leave rise_time_s out.",
             "largest step of the classic Runge-Kutta method for x' = -x",
         )
+    pulses = [each.pulse for each in craft.thruster if each.pulse is not None]
+    if pulses and timing.mode == "sampled":
+        yield Check(
+            "sampling.pulse_width",
+            max(max(each.least_on_s, each.quantum_s) for each in pulses),
+            timing.sample_period,
+            "s",
+            "fail",
+            "A least width or quantum of pulses is longer than the sample period: no pulse of it can be made.",
+            "Shorten least_on_s and quantum_s, or sample slower.",
+            "one pulse a sample",
+        )
     swings = [("flexible_mode", i, each.frequency_Hz) for i, each in enumerate(craft.flexible_mode, 1)]
     swings += [("slosh", i, each.frequency_Hz) for i, each in enumerate(craft.slosh, 1)]
     if not swings:
