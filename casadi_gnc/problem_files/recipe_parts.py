@@ -64,19 +64,8 @@ class OfPlant(Recipe):
     def _from_mission(cls, data: Any, info: ValidationInfo) -> Any:
         if not isinstance(data, dict):
             return data
-        named, told = data.get("mission"), [key for key in ("A", "B") if data.get(key) is not None]
-        if named is None:
-            if not told:
-                raise MisfitError("is missing; give A and B, or mission, whose plant is then linearised", "A")
-            if len(told) < 2:
-                raise MisfitError(f"is missing beside {told[0]}", "B" if told == ["A"] else "A")
-            if data.get("scheme") is not None:
-                raise MisfitError("names one of the mission that the key mission names; give that too", "scheme")
+        if not _is_linearised(data, "mission", "mission, whose plant is then linearised"):
             return data
-        if told:
-            raise MisfitError(
-                f"is given beside {told[0]}; the plant comes from one of them, leave the other out", "mission"
-            )
         return {**data, **_linearised(data, (info.context or {}).get("folder", Path()))}
 
     def arguments(self) -> dict[str, Any]:
@@ -132,19 +121,27 @@ def one_of_starts(part: Any) -> Any:
     return part
 
 
+def _is_linearised(data: dict[str, Any], key: str, offered: str) -> bool:
+    """Return whether A and B come from what a key names; raise `MisfitError` where neither or both give them."""
+    told = [name for name in ("A", "B") if data.get(name) is not None]
+    if data.get(key) is not None:
+        if told:
+            raise MisfitError(f"is given beside {told[0]}; A and B come from one of them, leave the other out", key)
+        return True
+    if not told:
+        raise MisfitError(f"is missing; give A and B, or {offered}", "A")
+    if len(told) < 2:
+        raise MisfitError(f"is missing beside {told[0]}", "B" if told == ["A"] else "A")
+    if data.get("scheme") is not None:
+        raise MisfitError(f"names one of what the key {key} names; give that too", "scheme")
+    return False
+
+
 def vertices_of(data: dict[str, Any], info: ValidationInfo) -> dict[str, Any]:
     """Return the keys of a recipe of several plants, with A and B, a matrix each, from the missions that it names."""
-    told, named = [key for key in ("A", "B") if data.get(key) is not None], data.get("missions")
-    if named is None:
-        if len(told) < 2:
-            raise MisfitError("is missing; give A and B, or missions", "A" if told != ["A"] else "B")
-        if data.get("scheme") is not None:
-            raise MisfitError("names one of the missions that the key missions names; give that too", "scheme")
+    named = data.get("missions")
+    if not _is_linearised(data, "missions", "missions"):
         return data
-    if told:
-        raise MisfitError(
-            f"is given beside {told[0]}; the plants come from one of them, leave the other out", "missions"
-        )
     if not isinstance(named, list) or not named or not all(isinstance(one, str) for one in named):
         return data  # what is wrong with it is told by its type
     folder = (info.context or {}).get("folder", Path())

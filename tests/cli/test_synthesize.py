@@ -309,7 +309,7 @@ def test_the_plant_of_a_mission_is_designed_for_and_gets_the_gains(docking):
 @pytest.mark.parametrize(
     ("added", "told"),
     [
-        ('mission = "docking.toml"\nA = [[1.0]]', "recipe.mission: is given beside A; the plant comes from one"),
+        ('mission = "docking.toml"\nA = [[1.0]]', "recipe.mission: is given beside A; A and B come from one"),
         (
             'mission = "docking.toml"\nscheme = "x"',
             "recipe.scheme: no scheme 'x' in docking; there is iobc, iobc_printed",
@@ -318,7 +318,7 @@ def test_the_plant_of_a_mission_is_designed_for_and_gets_the_gains(docking):
         ("A = [[1.0]]", "recipe.B: is missing beside A"),
         (
             'A = [[1.0]]\nB = [[1.0]]\nscheme = "x"',
-            "recipe.scheme: names one of the mission that the key mission names",
+            "recipe.scheme: names one of what the key mission names",
         ),
         ("", "recipe.A: is missing; give A and B, or mission, whose plant is then linearised"),
     ],

@@ -110,9 +110,12 @@ def test_a_gain_for_two_missions_is_written_into_one(tmp_path):
     ("lines", "told"),
     [
         (ROWS, "recipe.A: is missing; give A and B, or missions"),
-        (ROWS + "A = [[[1.0]]]\n", "recipe.B: is missing; give A and B, or missions"),
+        (ROWS + "A = [[[1.0]]]\n", "recipe.B: is missing beside A"),
         (ROWS + 'A = [[[1.0]]]\nmissions = ["x"]\n', "recipe.missions: is given beside A"),
-        (ROWS + 'A = [[[1.0]]]\nB = [[[1.0]]]\nscheme = "x"\n', "recipe.scheme: names one of the missions"),
+        (
+            ROWS + 'A = [[[1.0]]]\nB = [[[1.0]]]\nscheme = "x"\n',
+            "recipe.scheme: names one of what the key missions names",
+        ),
         (ROWS + 'missions = ["nowhere.toml"]\n', "recipe.missions: cannot be read"),
         (ROWS + "missions = []\n", "recipe.missions"),
         (ROWS + "A = [[1.0]]\nB = [[[1.0]]]\n", "recipe.A"),
