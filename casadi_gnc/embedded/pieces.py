@@ -84,15 +84,15 @@ def table_piece(table: Table, name: str, place: str, real: Real) -> Piece:
     lines += [_array("gnc_real", "values", (c_constant(one, real) for one in table.values))]
     lines += [_array("int32_t", "even", map(str, table.modes))]
     lines += [_array("int32_t", "degrees", map(str, table.degrees))] if table.degrees else []
-    given = "starts, grid, values, even, " + ("degrees, " if table.degrees else "")
-    room = ["gnc_real value[" + str(table.outputs) + "];"] if table.slopes else []
-    lines += [f"    {line}" for line in room]
-    lines += [f"    {helper}({table.dimensions}, {given}{table.outputs}, x0, {'value, ' if room else ''}y0);"]
-    inputs = [Port("x0", table.dimensions)]
+    given = "starts, grid, values, even, degrees" if table.degrees else "starts, grid, values, even"
+    inputs, results = [Port("x0", table.dimensions)], "y0"
+    outputs = (Port("y0", table.outputs),)
     if table.slopes:  # CasADi hands the result of the table to what computes its slopes, which do not need it
         inputs.append(Port("x1", 0))
-        lines.insert(len(lines) - 1, "    (void)x1;")
-    outputs = (Port("y0", table.outputs * (table.dimensions if table.slopes else 1)),)
+        outputs = (Port("y0", table.outputs * table.dimensions),)
+        lines += [f"    gnc_real value[{table.outputs}];", "    (void)x1;"]
+        results = "value, y0"
+    lines += [f"    {helper}({table.dimensions}, {given}, {table.outputs}, x0, {results});"]
     helpers = ("find_interval", *(["find_cell"] if not table.degrees else []), helper)
     return Piece(name, tuple(inputs), outputs, tuple(lines), helpers, False, table.dimensions, degree)
 
