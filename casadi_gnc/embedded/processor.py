@@ -2,45 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 from casadi_gnc.embedded import thumb
-from casadi_gnc.embedded.intervals import Value, Values, join, logic, word
+from casadi_gnc.embedded.intervals import Value, Values, logic, word
+from casadi_gnc.embedded.known_state import Memory, State
 from casadi_gnc.embedded.thumb import Instruction
 from casadi_gnc.errors import TargetError
-
-#: Where the objects of the call lie, far from each other, and the top of the stack.
-OBJECTS, APART, STACK = 0x40000000, 0x1000000, 0x20300000
-
-
-@dataclass
-class State:
-    """Hold what is known at one moment: registers, memory by address and size, narrowed intervals, flags.
-
-    Flags are of a comparison of two words, of a result (with 0), or of a result with its carry.
-    """
-
-    registers: list[Value]
-    memory: dict[int, tuple[int, Value]] = field(default_factory=dict)
-    saved: frozenset[int] = frozenset()
-    narrowed: dict[int, tuple[int, int]] = field(default_factory=dict)
-    flags: tuple[str, Value, Value] | None = None
-
-    def copy(self) -> State:
-        """Return a state that may be changed."""
-        return State(list(self.registers), dict(self.memory), self.saved, dict(self.narrowed), self.flags)
-
-    def forget(self, first: int, size: int) -> None:
-        """Drop what is known of bytes in memory."""
-        memory = self.memory
-        if size > 64:
-            for at in [at for at, (width, _) in memory.items() if at < first + size and at + width > first]:
-                del memory[at]
-            return
-        for at in range(first - 3, first + size):
-            known = memory.get(at)
-            if known is not None and at + known[0] > first:
-                del memory[at]
 
 
 class Processor:
@@ -52,28 +18,11 @@ class Processor:
     """
 
     def __init__(self, constants: bytes) -> None:
-        self._constants = constants
         self._values = Values()
+        self._memory = Memory(constants, self._values)
 
     def _merge(self, a: State, b: State) -> State:
-        values = self._values
-        narrowed = {
-            key: (min(low, b.narrowed[key][0]), max(high, b.narrowed[key][1]))
-            for key, (low, high) in a.narrowed.items()
-            if key in b.narrowed
-        }
-        registers = [
-            x if x == y else join(values, x, a.narrowed, y, b.narrowed)
-            for x, y in zip(a.registers, b.registers, strict=True)
-        ]
-        memory = {}
-        for at, known in a.memory.items():
-            other = b.memory.get(at)
-            if other is None or other[0] != known[0]:
-                continue
-            same = known[1] == other[1]
-            memory[at] = known if same else (known[0], join(values, known[1], a.narrowed, other[1], b.narrowed))
-        return State(registers, memory, a.saved & b.saved, narrowed, a.flags if a.flags == b.flags else None)
+        return self._memory.merge(a, b)
 
     # ---- conditions -----------------------------------------------------------------------------------
 
@@ -279,45 +228,15 @@ class Processor:
             at = self._address(place, state, width)
             for index, value in enumerate(kept):
                 here = self._values.plus(at, 4 * index, state.narrowed)
-                self._store(here, width, value, state)
+                self._memory.store(here, width, value, state)
                 if place[0].startswith("[sp") and isinstance(here, int):
                     state.saved |= {here}
             return
         at = self._literal(one, place[0]) if literal else self._address(place, state, width)
         signed = name in ("ldrsb", "ldrsh")
         for index, target in enumerate(targets):
-            state.registers[target] = self._load(self._values.plus(at, 4 * index, state.narrowed), width, signed, state)
-
-    def _load(self, at: Value, width: int, signed: bool, state: State) -> Value:
-        half = 1 << (8 * width - 1)
-        low, high = (-half, half - 1) if signed or width == 4 else (0, 2 * half - 1)
-        if not isinstance(at, int):
-            return self._values.fresh(low, high)
-        known = state.memory.get(at)
-        if known is not None and known[0] == width:
-            return known[1]
-        if 0 <= at < len(self._constants) - width:
-            return word(int.from_bytes(self._constants[at : at + width], "little", signed=signed or width == 4))
-        value = self._values.fresh(low, high)
-        if STACK - APART < at <= STACK:  # a variable of the program, which it may look at again
-            state.forget(at, width)
-            state.memory[at] = (width, value)
-        return value
-
-    def _store(self, at: Value, width: int, value: Value | None, state: State) -> None:
-        if isinstance(at, int):
-            state.forget(at, width)
-            if value is not None and width <= 4:
-                if width < 4 and not isinstance(value, int):
-                    return
-                state.memory[at] = (width, value)
-            return
-        low, high = self._values.limits(at, state.narrowed)
-        if high - low < APART:
-            state.forget(low, high - low + width)
-            return
-        for place in [place for place in state.memory if place not in state.saved]:
-            del state.memory[place]
+            here = self._values.plus(at, 4 * index, state.narrowed)
+            state.registers[target] = self._memory.load(here, width, signed, state)
 
     def _block(self, one: Instruction, state: State) -> None:
         """Load or store several registers."""
@@ -333,11 +252,11 @@ class Processor:
         for index, target in enumerate(targets):
             at = self._values.plus(first, 4 * index, state.narrowed)
             if name in ("push", "stm", "stmia", "stmdb"):
-                self._store(at, 4, state.registers[target], state)
+                self._memory.store(at, 4, state.registers[target], state)
                 if base == 13 and isinstance(at, int):
                     state.saved |= {at}
             elif target != 15:
-                state.registers[target] = self._load(at, 4, False, state)
+                state.registers[target] = self._memory.load(at, 4, False, state)
         if written and base not in (targets if name[0] in "pl" and not stack else []):
             state.registers[base] = after
 
@@ -352,7 +271,7 @@ class Processor:
                 return
             at = self._address(given[1:], state, width)
             if kind == "vstr":
-                self._store(at, width, None, state)
+                self._memory.store(at, width, None, state)
         elif kind in ("vpush", "vpop", "vldmia", "vldmdb", "vstmia", "vstmdb"):
             self._real_block(kind, given, state)
         elif kind == "vmov":
@@ -369,7 +288,7 @@ class Processor:
         down = kind in ("vpush", "vldmdb", "vstmdb")
         first = self._values.plus(state.registers[base], -size if down else 0, state.narrowed)
         if kind in ("vpush", "vstmia", "vstmdb"):
-            self._store(first, size, None, state)
+            self._memory.store(first, size, None, state)
         if stack or given[0].endswith("!"):
             state.registers[base] = self._values.plus(state.registers[base], -size if down else size, state.narrowed)
 

@@ -16,8 +16,10 @@ import heapq
 from collections.abc import Callable
 
 from casadi_gnc.embedded import thumb
+from casadi_gnc.embedded.control_flow import find_loops
 from casadi_gnc.embedded.intervals import Unknown
-from casadi_gnc.embedded.processor import APART, OBJECTS, STACK, Processor, State
+from casadi_gnc.embedded.known_state import APART, OBJECTS, STACK, State
+from casadi_gnc.embedded.processor import Processor
 from casadi_gnc.embedded.thumb import Function, Instruction
 from casadi_gnc.errors import TargetError
 
@@ -125,7 +127,7 @@ class Counter(Processor):
     def _call(self, function: Function, state: State) -> int:
         """Run a function to its end; return its instructions, and leave the state behind it."""
         if not function.nest:
-            thumb.find_loops(function)
+            find_loops(function)
         ways = _Ways(function, self._merge)
         ways.add((), -1, function.start, 0, state)
         while ways.waiting:
