@@ -74,13 +74,13 @@ class Build:
         """Return the numbers of flights; none where a file of that row would be refused."""
         varied = self.objective.cases.varied
         found = np.full(len(rows), math.nan)
-        able = np.array([_holds(varied, row) for row in rows], dtype=bool)
+        able = np.array([holds(varied, row) for row in rows], dtype=bool)
         if able.any():
             found[able] = self.objective.at(rows[able])
         return found
 
 
-def _holds(varied: Varied, row: np.ndarray) -> bool:
+def holds(varied: Varied, row: np.ndarray) -> bool:
     """Return whether a craft with these numbers has no flaw, and its law can have them at its sample period."""
     try:
         made = varied.at(row)

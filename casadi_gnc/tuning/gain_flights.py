@@ -10,11 +10,10 @@ import numpy as np
 
 from casadi_gnc.campaigns.cases import Dispersion, cases_of
 from casadi_gnc.campaigns.dispersions import DispersionTable
-from casadi_gnc.campaigns.plans import Sobol
-from casadi_gnc.mathematics import normal
 from casadi_gnc.tuning.costs import Cost
 from casadi_gnc.tuning.gains import Gain, Gains
 from casadi_gnc.tuning.objective import Objective
+from casadi_gnc.tuning.space import Space
 
 if TYPE_CHECKING:
     from casadi_gnc.campaigns.store import Columns
@@ -22,10 +21,6 @@ if TYPE_CHECKING:
 
 #: Half the length over which a difference is taken, in coordinates of the gains: a share of the gain.
 _STEP = 1e-3
-#: Points of a search for the worst case: drawn, and about the worst so far.
-DRAWN, NEARBY = 128, 32
-#: Normal numbers are looked at up to so many deviations.
-_FAR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +51,11 @@ class Flights:
         self.objective = Objective(
             mission, scheme, parameters=[*map(_range, gains.each), *dispersions], what=column, threads=threads
         )
-        self.keys = self.objective.space.keys[gains.size :]
-        self.nominal = Case(self.objective.space.nominal[gains.size :], self.objective.seed, "nominal")
+        whole, given, first = self.objective.space, self.objective.cases.parts.given, gains.size
+        #: Of the dispersions, without the gains.
+        self.space = Space(whole.keys[first:], given[first:], whole.distributions[first:], whole.nominal[first:])
+        self.keys = self.space.keys
+        self.nominal = Case(self.space.nominal, self.objective.seed, "nominal")
         self.scales = np.ones(len(cost.terms))
 
     @property
@@ -89,37 +87,6 @@ class Flights:
         with np.errstate(invalid="ignore"):
             slopes = (costs[: len(z)] - costs[len(z) :]) / np.diag(ahead - behind)[:, None]
         return np.where(np.isfinite(slopes), slopes, np.nan).T
-
-    def worst(self, z: np.ndarray, number: int, seed: int) -> tuple[Case, float]:
-        """Return the worst case that a search finds for gains at coordinates z, and its cost.
-
-        Points of a Sobol sequence, those of a later search other ones, and then three rounds about the worst, each
-        closer. Points are in standard units (`casadi_gnc.tuning.space`), normal numbers within three deviations.
-
-        Parameters
-        ----------
-        number : of the search; each draws other points. seed : of all of them.
-        """
-        space, size = self.objective.space, self.gains.size
-        dense, ends = space.dense[size:], np.minimum(space.high[size:], _FAR)
-        cube = Sobol(len(ends)).points(seed, number * DRAWN, (number + 1) * DRAWN)
-        points = np.where(dense, normal.quantile(cube), 2.0 * cube - 1.0)
-        generator = np.random.default_rng((seed, number))
-        best, most = self.nominal, -np.inf
-        middle = np.zeros(len(ends))
-        for reach in (None, 0.5, 0.25, 0.1):
-            if reach is not None:
-                points = middle + reach * generator.standard_normal((NEARBY, len(ends)))
-            points = np.clip(points, -ends, ends)
-            whole = np.hstack([np.zeros((len(points), size)), points])
-            cases = [Case(row[size:], self.nominal.seed) for row in space.rows(whole)]
-            table = self.table(self.gains.values(z), cases)
-            costs = self.cost.total(self.cost.values(table), self.scales)
-            costs[np.array([bool(why) for why in table["refused"]])] = -np.inf  # no such craft
-            i = int(np.argmax(costs))
-            if costs[i] > most:
-                best, most, middle = cases[i], float(costs[i]), points[i]
-        return best, most
 
 
 def planned(

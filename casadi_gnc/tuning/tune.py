@@ -12,6 +12,7 @@ import numpy as np
 from casadi_gnc.errors import GncError, TuningError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files.by_name import mission_of
+from casadi_gnc.tuning.adversary import worst_case
 from casadi_gnc.tuning.conditions import conditions_of, new_troubles, verdicts_of
 from casadi_gnc.tuning.costs import cost_of
 from casadi_gnc.tuning.descent import Iterate, Problem, begin, descend
@@ -22,8 +23,6 @@ from casadi_gnc.tuning.outcome import Tuned, outcome
 from casadi_gnc.tuning.writing import refuse_target, write
 
 Against = Literal["nominal", "worst", "campaign"]
-#: A search for the worst case that finds none worse by such a share ends the alternation.
-_NO_WORSE = 0.005
 #: Iterations between two searches for the worst case.
 _BETWEEN = 5
 #: Called with a sentence.
@@ -65,8 +64,8 @@ def tune(
     free : names of the gains that may change, with their bounds if wanted: "rate_gain", "rate_gain=0.1:5"; one of
         several numbers stands for all of them. Without bounds a gain may become 10 times smaller or larger.
     scheme : its name; the first by default.
-    against : "nominal", the mission as it is; "worst", the worst case of its dispersions that a search finds, in turn
-        with the tuning until it finds none that is worse; "campaign", the mean over the cases of a plan.
+    against : "nominal", the mission as it is; "worst", the worst case of its dispersions that the search of `falsify`
+        finds, in turn with the tuning until it finds none that is worse; "campaign", the mean over the cases of a plan.
     cost : what is made small, see `casadi_gnc.tuning.costs`; by default the integrals of what the craft regulates,
         rates only where there is nothing else, and a tenth of that of the effort.
     conditions : of the law's theorems: those that hold before must hold after ("held"), or "all" must.
@@ -131,7 +130,8 @@ def tune(
     if state is None:
         own = planned(mission, chosen, dispersions, plan, cases, seed) if against == "campaign" else [flights.nominal]
         if against == "worst":
-            own.append(flights.worst(gains.start, 0, seed)[0])
+            first = worst_case(flights, gains.start, float(flights.costs(gains.start[None, :], own)[0, 0]), seed)
+            own += [] if first is None else [first[0]]
         state = _State(own, 1, begin(problem_of(own), gains.start), [])
         _refuse_flat(problem_of(own), state.at, gains)
         state.course.append((state.at.value, "start"))
@@ -147,15 +147,14 @@ def tune(
                 told(f"iteration {at.number}: cost {at.value:.4g} ({at.how})")
         if against != "worst":
             break
-        case, value = flights.worst(state.at.z, state.searches, seed)
-        worse = value > state.at.value * (1.0 + _NO_WORSE)
+        worse = worst_case(flights, state.at.z, state.at.value, seed + state.searches)
         if told:
-            told(f"search {state.searches} for a worse case: {value:.4g}, {'worse' if worse else 'not worse'}")
-        if not worse and (state.at.done or state.at.number >= iterations):
+            told(f"search {state.searches} for a worse case: {'none' if worse is None else f'{worse[1]:.4g}'}")
+        if worse is None and (state.at.done or state.at.number >= iterations):
             break
         searches = state.searches + 1
-        if worse:
-            own = [*state.cases, case]
+        if worse is not None:
+            own = [*state.cases, worse[0]]
             again = begin(problem_of(own), state.at.z, radius=min(1.0, state.at.radius), number=state.at.number)
             again = replace(again, curvature=state.at.curvature)
             state = _State(own, searches, again, [*state.course, (again.value, "a worse case")])

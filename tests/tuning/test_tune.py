@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,30 @@ uniform = [70.0, 100.0]
 [[dispersion]]
 key = "initial.angle_deg"
 normal = { mean = 60.0, deviation = 5.0, truncate = 3.0 }
+"""
+
+BLOCK = """format = 1
+kind = "mission"
+
+[spacecraft]
+model = "./block.py:BlockCraft"
+
+[timing]
+mode = "sampled"
+sample_period_s = 0.1
+duration_s = 5.0
+
+[[scheme]]
+name = "brake"
+law = { type = "./block.py:Brake", brake_gain = 2.0 }
+
+[[dispersion]]
+key = "spacecraft.wind_N"
+uniform = [-0.5, 0.5]
+
+[[dispersion]]
+key = "spacecraft.speed_m_per_s"
+normal = { mean = 1.0, deviation = 0.1 }
 """
 
 
@@ -100,6 +125,26 @@ def test_the_worst_case_of_fresh_dispersions_is_better(mission):
     # A search that draws and then climbs finds a case at least nearly as bad as the worst of 200 that are drawn.
     assert found.terms[0].worst_after > 0.97 * worst[1]
     assert found.terms[0].worst_before > found.terms[0].before
+
+
+def test_the_worst_case_is_that_which_follows_by_hand(tmp_path):
+    """A block, v' = (1 - k h) v + h w: the mean of v grows with wind and start, so the worst is at the end of both.
+
+    Wind is uniform up to 0.5, the start normal and looked at up to four deviations: 0.5 and 1 + 4 * 0.1. After n
+    samples v is (1 - k h)^n (v0 - w/k) + w/k, which stays above zero.
+    """
+    (tmp_path / "block.py").write_text(Path(__file__).with_name("block.py").read_text())
+    (tmp_path / "block.toml").write_text(BLOCK)
+    found = gnc.tune(tmp_path / "block.toml", ["brake_gain=1:4"], cost="integral(speed)", against="worst",
+                     iterations=2, threads=1)  # fmt: skip
+    worst = found.cases[-1]
+    assert worst.values == pytest.approx([0.5, 1.4], rel=1e-3)
+    means = []
+    for k in (found.gains[0].before, found.gains[0].after):
+        decay, rest = (1 - 0.1 * k) ** np.arange(51), 0.5 / k
+        means.append(5.0 * np.mean(decay * (1.4 - rest) + rest))
+    assert [found.terms[0].worst_before, found.terms[0].worst_after] == pytest.approx(means, rel=1e-3)
+    assert found.gains[0].after == 4.0
 
 
 def test_a_killed_run_goes_on_and_comes_to_the_same(mission):
