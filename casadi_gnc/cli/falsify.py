@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
@@ -42,7 +42,10 @@ def falsify(
     ] = None,
     over: Annotated[
         list[str] | None,
-        typer.Option(help="KEY=VALUE,VALUE,...: a further key of the file, a build for each value; may be repeated."),
+        typer.Option(
+            help="KEY=VALUE,VALUE,...: a further key of the file, a build for each value; allocation or theorem: all "
+            "that these claim to cover. May be repeated."
+        ),
     ] = None,
     within: Annotated[
         Within, typer.Option(help="contour of the density, box, or ellipsoid in that box.")
@@ -59,6 +62,7 @@ def falsify(
     same command goes on.
     """
     from casadi_gnc.problem_files.loading import load
+    from casadi_gnc.tuning.claims import Claimant
     from casadi_gnc.tuning.falsifying import falsify as look
 
     mission = load(problem)
@@ -68,7 +72,8 @@ def falsify(
             mission,
             requirement,
             scheme=scheme,
-            over=_values(over or []),
+            over=_values([each for each in over or [] if each not in get_args(Claimant)]),
+            claims=[each for each in get_args(Claimant) if each in (over or [])],
             within=within.value,
             radius=radius,
             flights=flights,
@@ -101,7 +106,9 @@ def _values(told: list[str]) -> dict[str, list[Any]]:
         except tomllib.TOMLDecodeError:
             found[key] = []
         if not found[key]:
-            raise CampaignError(f"--over is {each!r}; expected KEY=VALUE,VALUE,..., values as in the file")
+            raise CampaignError(
+                f"--over is {each!r}; expected KEY=VALUE,VALUE,..., values as in the file, or allocation, theorem"
+            )
     return found
 
 

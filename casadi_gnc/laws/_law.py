@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, get_type_hints
 
@@ -124,6 +124,13 @@ class Law:
             return None
         kind = get_type_hints(cls)["body"]
         return object if kind is Any else kind
+
+    def covers(self) -> Mapping[str, tuple[float, float]]:
+        """Return the ranges of the craft's true numbers for which the law's theorem holds, by name; none if left out.
+
+        The law names what it knows (`mass`, `inertia.1.2`); a craft says by `claimed` which keys of a file these are.
+        """
+        return {}
 
     @property
     def belief(self) -> Any:

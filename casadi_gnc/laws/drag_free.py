@@ -150,6 +150,15 @@ class DragFree(Law):
         for part in ("attitude", "position"):
             yield from SampledFunnel(self, part).checks()
 
+    def covers(self) -> dict[str, tuple[float, float]]:
+        """Return mass and inertia for which the adaptation's proofs, eqs (50) and (84), hold."""
+        names = ("inertia.1.1", "inertia.2.2", "inertia.3.3", "inertia.1.2", "inertia.1.3", "inertia.2.3")
+        found = {}
+        for box, rows in ((self._mass_box(), ("mass",)), (self._inertia_box(), names)):
+            ends = (ca.DM(part).elements() for part in box.covers())
+            found.update(zip(rows, zip(*ends, strict=True), strict=True))
+        return found
+
     def _inertia_box(self) -> Projection:
         return inertia_box(self.moment_box[0], self.moment_box[1], self.product_box)
 

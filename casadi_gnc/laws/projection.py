@@ -44,6 +44,11 @@ class Projection:
         outward = (estimate - (self.lower + self.upper) / 2) * rate > 0
         return ca.if_else(outward, rate * bounds.clip(room, 0.0, 1.0), rate)
 
+    def covers(self) -> tuple[Any, Any]:
+        """Return between which ends, (n,) each, a truth must lie for the proofs: a tenth inside the box."""
+        room = FADE * (self.upper - self.lower)
+        return self.lower + room, self.upper - room
+
     def check(self, start: Any, name: str) -> None:
         """Raise `LawError` for an empty box, or one that `start` lies outside of; symbols pass."""
         if not all(map(exact.is_number, (self.lower, self.upper, start))):

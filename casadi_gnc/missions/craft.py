@@ -10,7 +10,7 @@ file names a class as "./sail.py:SailCraft", Python takes an object.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import Field, ValidationError
 
@@ -147,6 +147,12 @@ class Craft(Part):
 
     def true_effectivenesses(self, mission: Mission, scheme: Scheme) -> Mapping[str, Any]:
         """Return the effectivenesses, (R, N), that errors and faults may make true under a scheme, by what they are."""
+        return {}
+
+    def claimed(
+        self, mission: Mission, scheme: Scheme, by: Literal["allocation", "theorem"]
+    ) -> Mapping[str, tuple[float, float]]:
+        """Return the ranges of keys of a file that a scheme's allocation is set up for, or its law's theorem covers."""
         return {}
 
     def flaws(self) -> Iterable[MisfitError]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,6 +27,11 @@ def _found(value: Any, info: ValidationInfo) -> Any:
 BackEndName = Annotated[
     Any, BeforeValidator(_found), WithJsonSchema({"type": "string", "description": "a back end of the allocation"})
 ]
+
+
+def mass_centre(half: Sequence[float]) -> dict[str, tuple[float, float]]:
+    """Return the box of a true centre of mass's errors, by key of a file; an axis without error is none of it."""
+    return {f"truth.centre_of_mass_error_m.{i}": (-one, one) for i, one in enumerate(half, 1) if one > 0}
 
 
 class Pinv(Part):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from typing import get_args
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from casadi_gnc.missions.engines import CompiledEngine
 from casadi_gnc.missions.flying import begin
 from casadi_gnc.missions.machine_engine import VirtualMachineEngine
 from casadi_gnc.missions.mission import Mission
+from casadi_gnc.missions.paths import numbers_of
 from casadi_gnc.testing.asserting import must
 from casadi_gnc.testing.law import check_law
 from casadi_gnc.testing.plant import check_plant
+from casadi_gnc.tuning.claims import Claimant
 
 #: Samples that both engines fly.
 _SAMPLES = 20
@@ -40,6 +43,10 @@ def check_craft(mission: Mission) -> None:
     for whose, matrix in craft.true_effectivenesses(mission, scheme).items():
         expected = (scheme.actuation.effort.size, mission.truth.inputs.size)
         must(np.shape(matrix) == expected, f"{whose} of {name} has shape {np.shape(matrix)}, expected {expected}")
+    for by in get_args(Claimant):
+        for key, (low, high) in craft.claimed(mission, scheme, by).items():
+            must(low < high, f"{name}.claimed gives {key} the range from {low:g} to {high:g}, which is empty")
+            numbers_of(mission, key)
 
 
 def check_mission(mission: Mission) -> None:

@@ -22,6 +22,7 @@ from casadi_gnc.problem_files.by_name import mission_of
 from casadi_gnc.problem_files.loading import load_document
 from casadi_gnc.tuning.broken_case import Break, break_of, document_of, moved_of
 from casadi_gnc.tuning.certificate import Certificate, certificate
+from casadi_gnc.tuning.claims import Claimant, claimed
 from casadi_gnc.tuning.descending import Effort
 from casadi_gnc.tuning.falsified import Falsified
 from casadi_gnc.tuning.flights import Build, Flights, Told, Trial
@@ -43,6 +44,7 @@ def falsify(
     *,
     scheme: str | None = None,
     over: Mapping[str, Sequence[Any]] | None = None,
+    claims: Sequence[Claimant] = (),
     within: Kind = "contour",
     radius: float = 4.0,
     flights: int = 1000,
@@ -60,6 +62,8 @@ def falsify(
     scheme : which one flies; the first by default.
     over : values of further keys of the file, a build each, such as {"timing.sample_period_s": [0.1, 0.2]}: sizes,
         sample periods and what else cannot be dispersed. All combinations are flown.
+    claims : "allocation" and "theorem": search also all of what the scheme's allocation is set up against, or what the
+        theorem of its law covers (`casadi_gnc.tuning.claims`).
     within : "contour", "box" or "ellipsoid" (`casadi_gnc.tuning.reach`).
     radius : of that set, in standard deviations of what is normal.
     flights : at most.
@@ -72,8 +76,8 @@ def falsify(
     Raises
     ------
     GncError
-        For a requirement that is not there or not met by the mission as it is, a mission without dispersion, an
-        `over` of a mission that was made from objects, a journal of another search.
+        For a requirement that is not there or not met by the mission as it is, a mission without dispersion, a claim
+        of nothing, an `over` of a mission that was made from objects, a journal of another search.
     """
     mission = mission_of(problem)
     chosen = mission.scheme(scheme).name
@@ -81,6 +85,7 @@ def falsify(
     if asked is None:
         known = ", ".join(one.id for one in mission.requirements) or "none: add a [[requirement]]"
         raise CampaignError(f"the mission has no requirement {requirement!r}; there is {known}")
+    mission, notes = claimed(mission, chosen, claims)
     if not mission.dispersions and not over:
         raise CampaignError(
             f"nothing varies in {mission.name}: it has no [[dispersion]], so there is nothing to search; add one for "
@@ -88,7 +93,7 @@ def falsify(
         )
     if flights < 1:
         raise CampaignError(f"{flights} flights are allowed; expected 1 or more")
-    builds = _builds(mission, chosen, requirement, dict(over or {}), threads)
+    builds = _builds(mission, chosen, requirement, dict(over or {}), claims, threads)
     space = builds[0].objective.space
     reach = Reach(space, within, radius)
     place = None if out is None else Path(out)
@@ -97,7 +102,7 @@ def falsify(
     nominal = _nominal(searched, asked)
     trial = search(searched, reach, seed, effort)
     first = None if trial is None else searched.count
-    notes = [
+    notes += [
         f"{', '.join(f'{key} = {value!r}' for key, value in one.changes.items())} cannot fly: {one.why}"
         for one in builds
         if one.why
@@ -151,8 +156,9 @@ def falsify(
 
 
 def _builds(
-    mission: Mission, scheme: str, requirement: str, over: dict[str, Sequence[Any]], threads: int | None
-) -> list[Build]:
+    mission: Mission, scheme: str, requirement: str, over: dict[str, Sequence[Any]],
+    claims: Sequence[Claimant] = (), threads: int | None = None,
+) -> list[Build]:  # fmt: skip
     """Return the mission and, for each combination of what `over` says, another."""
     builds = [Build(lambda: Objective(mission, scheme, what=requirement, threads=threads))]
     if not over:
@@ -168,7 +174,7 @@ def _builds(
         changes = dict(zip(over, values, strict=True))
 
         def make(changes: dict[str, Any] = changes) -> Objective:
-            other = load_document(document, {**before, **changes})
+            other, _ = claimed(load_document(document, {**before, **changes}), scheme, claims)
             return Objective(other, scheme, what=requirement, threads=threads)
 
         builds.append(Build(make, changes))

@@ -148,7 +148,7 @@ def main() -> None:
             whole = gnc.falsify(file, "P", over=planted.over, out=folder / "b.toml")
             took = time.perf_counter() - began
             mission = gnc.load(folder / "whole.toml")
-            builds = _builds(mission, mission.schemes[0].name, "P", dict(planted.over), None)
+            builds = _builds(mission, mission.schemes[0].name, "P", dict(planted.over))
             plain, refly = [Plain(build) for build in builds], []
             for seed in itertools.count():
                 if len(rows) == given.seeds:

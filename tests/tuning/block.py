@@ -41,6 +41,10 @@ class BlockCraft(gnc.Craft):
     def actuators(self):
         return gnc.Actuators(ca.DM.eye(3), [-100.0] * 3, [100.0] * 3, effort=PUSH)
 
+    def claimed(self, mission, scheme, by):
+        own = scheme.law.covers() if by == "theorem" else {}
+        return {f"spacecraft.{name}_N": ends for name, ends in own.items()}
+
     def regulated(self, mission):
         return {"speed": [0.0] * 3}
 
@@ -50,6 +54,9 @@ class Brake(gnc.Law):
     brake_gain: Any = gnc.gain("N s/m", "push per speed", symbol="k", above=0.0)
     effort: ClassVar = PUSH
     inputs = gnc.Layout((gnc.Signal("speed", 3, "m/s"),))
+
+    def covers(self):
+        return {"wind": (-0.5, 0.5)}
 
     def command(self, t, y, m):
         return -self.brake_gain * y

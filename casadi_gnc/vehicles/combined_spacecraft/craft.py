@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, cast
+from typing import ClassVar, Literal, cast
 
 import casadi as ca
 import numpy as np
@@ -27,6 +27,7 @@ from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.scene import Arrow, Jets, Scene
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
+from casadi_gnc.tables.allocation import mass_centre
 from casadi_gnc.tables.attitude import AttitudeStart
 from casadi_gnc.tables.disturbances import OrbitAndTorque
 from casadi_gnc.tables.orientation import Orientation
@@ -179,6 +180,15 @@ class CombinedSpacecraftCraft(Craft, Orientation):
         yield from geometry.orbit_frame(self.environment, mission)
         if self.believed.turned() is not None:
             yield geometry.believed_axes(self.matrix(), self.believed.matrix())
+
+    def claimed(
+        self, mission: Mission, scheme: Scheme, by: Literal["allocation", "theorem"]
+    ) -> dict[str, tuple[float, float]]:
+        """Return the errors of the centre of mass that a robust allocation is set up for."""
+        told = cast(SchemeKeys, scheme.keys).allocation
+        if by == "theorem" or not isinstance(told, RobustAgainstMassCentre):
+            return {}
+        return mass_centre(told.centre_of_mass_error_m)
 
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether the thrusters leave an axis out."""

@@ -7,7 +7,7 @@ Tables of the file: [spacecraft], the satellite; [orbit] of the test mass; [beli
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, cast
+from typing import ClassVar, Literal, cast
 
 from pydantic import Field
 
@@ -107,6 +107,16 @@ class DragFreePairCraft(Craft):
         """Yield whether the law's own handling of saturation lets it keep its funnels."""
         for signal in _shifted(scheme):
             yield from manoeuvre.auxiliary(mission, scheme, signal)
+
+    def claimed(
+        self, mission: Mission, scheme: Scheme, by: Literal["allocation", "theorem"]
+    ) -> dict[str, tuple[float, float]]:
+        """Return masses and inertias that the law's theorem covers."""
+        if by == "allocation":
+            return {}
+        names = {"mass": "mass_kg", "inertia": "inertia_kg_m2"}
+        parts = ((name.partition("."), ends) for name, ends in scheme.law.covers().items())
+        return {f"spacecraft.{names[head]}{dot}{rest}": ends for (head, dot, rest), ends in parts if head in names}
 
     def rehearses(self, mission: Mission, scheme: Scheme) -> bool:
         """Return whether there is such a funnel."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Literal, cast
 
 import casadi as ca
 import numpy as np
@@ -29,6 +29,7 @@ from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.scene import Arrow, Scene, Spinners
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.tables import matrices
+from casadi_gnc.tables.allocation import mass_centre
 from casadi_gnc.tables.attitude import AttitudeStart
 from casadi_gnc.tables.disturbances import OrbitAndTorque
 from casadi_gnc.tables.orientation import Orientation
@@ -196,6 +197,32 @@ class WheelSpacecraftCraft(Craft, Orientation):
             told = ", ".join(f"{fault.channel} {fault.index} at {fault.effectiveness:g}" for fault in weak) or "biases"
             found[f"the faults from {onset:g} s on ({told})"] = e
         return found
+
+    def claimed(
+        self, mission: Mission, scheme: Scheme, by: Literal["allocation", "theorem"]
+    ) -> dict[str, tuple[float, float]]:
+        """Return the errors of the centre of mass and the shares of wheels that a robust allocation is set up for.
+
+        Raises
+        ------
+        FlightError
+            For a wheel without a fault, through which alone its share may come true.
+        """
+        told = cast(SchemeKeys, scheme.keys).allocation
+        if by == "theorem" or not isinstance(told, RobustWheels):
+            return {}
+        found, shares = mass_centre(told.centre_of_mass_error_m or []), told.wheel_effectiveness
+        if shares is None or not shares[0] < shares[1]:
+            return found
+        faults = {i: fault.index for i, fault in enumerate(self.fault, 1) if fault.channel == "wheel"}
+        lacking = sorted({*range(1, len(self.wheels.axes) + 1)} - {*faults.values()})
+        if lacking:
+            raise FlightError(
+                f"the allocation is set up for wheels of {shares[0]:g} to {shares[1]:g} of their command, and wheel "
+                f"{', '.join(map(str, lacking))} has no fault by which that comes true; give each a [[fault]] with "
+                'channel = "wheel" and effectiveness = 1.0'
+            )
+        return {**found, **{f"fault.{i}.effectiveness": (shares[0], shares[1]) for i in faults}}
 
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether the wheels leave an axis out."""
