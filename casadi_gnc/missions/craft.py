@@ -152,7 +152,13 @@ class Craft(Part):
     def claimed(
         self, mission: Mission, scheme: Scheme, by: Literal["allocation", "theorem"]
     ) -> Mapping[str, tuple[float, float]]:
-        """Return the ranges of keys of a file that a scheme's allocation is set up for, or its law's theorem covers."""
+        """Return the ranges of keys of a file that a scheme's allocation is set up for, or its law's theorem covers.
+
+        Parameters
+        ----------
+        mission, scheme : what is flown.
+        by : who claims them.
+        """
         return {}
 
     def flaws(self) -> Iterable[MisfitError]:
