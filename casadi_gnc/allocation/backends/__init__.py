@@ -128,6 +128,8 @@ REGISTRY = Registry(
             "rpinv": "generalized_inverses_:RPINV",
             "cgi": "generalized_inverses_:CGI",
             "px4": "px4_",
+            "rls": "robust_least_squares_:RLS",
+            "ellipsoid": "robust_least_squares_:ELLIPSOID",
             "pinv": "pinv_",
         }.items()
     },

@@ -40,8 +40,8 @@ class ConicForm(Protocol):
         """Return b."""
         ...
 
-    def weights(self, multipliers: np.ndarray) -> np.ndarray:
-        """Return the vertex weights, (V,), of the multipliers of all rows."""
+    def weights(self, multipliers: np.ndarray) -> np.ndarray | None:
+        """Return the vertex weights, (V,), of the multipliers of all rows; None where there are none."""
         ...
 
 

@@ -75,7 +75,11 @@ class ScaledSolver(ABC):
         self.effort_quadratic = 2 * problem.effort_weights * self._reach**2 / self._cost
         self.change_quadratic = 2 * problem.change_weight * self._reach**2 / self._cost
         self.quadratic = self.effort_quadratic + self.change_quadratic
-        self.matrices = problem.vertices * self._reach / self._effort
+        self.matrices = self.in_units(problem.vertices)
+
+    def in_units(self, effectiveness: np.ndarray) -> np.ndarray:
+        """Return an effectiveness, (..., N), as scaled effort by scaled force."""
+        return effectiveness * self._reach / self._effort
 
     @abstractmethod
     def attempt(self, sample: Sample) -> Found:
