@@ -102,6 +102,27 @@ class LinearLoop:
         """What actuators do beside what was asked, of which the law hears: to regulated states and memory, (n, N)."""
         return self._jacobians[6]
 
+    @property
+    def pushed_by_efforts(self) -> np.ndarray:
+        """What a held effort does of which the law does not hear: to regulated states and memory, (n, R).
+
+        NaN where the actuators do not make every effort.
+        """
+        pushed, effectiveness = self._jacobians[3], self._jacobians[7]
+        if np.linalg.matrix_rank(effectiveness) < len(effectiveness):
+            return np.full((len(pushed), len(effectiveness)), np.nan)
+        return pushed @ np.linalg.pinv(effectiveness)
+
+    def held_by(self, push: np.ndarray) -> np.ndarray:
+        """Return where pushes that last, (n, k), hold regulated states and memory, (n, k); NaN where nothing rests."""
+        moves = moving_rows(self.matrix, self.sampled)
+        inner = self.matrix[np.ix_(moves, moves)]
+        growth = spectral_radius(inner if self.sampled else linalg.expm(inner))
+        found = np.full(push.shape, 0.0 if growth < 1 else np.nan)
+        if growth < 1:
+            found[moves] = np.linalg.solve((np.eye(len(inner)) if self.sampled else 0.0) - inner, push[moves])
+        return found
+
     @cached_property
     def _jacobians(self) -> tuple[np.ndarray, ...]:
         (x0, m0), (_, point) = self.target, _functions(self.mission, self.scheme)
@@ -202,7 +223,7 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
         later = loop.advanced(s.t, seen, remembered, wanted, told)
     else:
         later = loop.flowing(s.t, seen, remembered, wanted, told)
-    made = loop.made(y, actuators)
+    made, effectiveness = loop.made(y, actuators), ca.SX(_effectiveness(loop, y))
     rows, late = rows_of(mission), s.actuators
     state = ca.vertcat(s.x[rows], s.m)
     closed = ca.vertcat(ca.substitute(x, late, actuators)[rows], ca.substitute(later, told, made))
@@ -215,7 +236,8 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
         ca.jacobian(waiting, late),
         ca.jacobian(actuators, state),
         ca.jacobian(actuators, late),
-        ca.vertcat(ca.jacobian(x[rows], late), ca.mtimes(ca.jacobian(later, told), ca.SX(_effectiveness(loop, y)))),
+        ca.vertcat(ca.jacobian(x[rows], late), ca.mtimes(ca.jacobian(later, told), effectiveness)),
+        effectiveness,
     ]
     return (
         ca.Function("closed", [s.t, s.x, s.m], [closed]),

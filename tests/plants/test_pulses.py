@@ -200,7 +200,7 @@ def test_a_flight_keeps_the_rules_of_its_valves():
     for t, mrp, rate, pulses in zip(flight.time[:300], flight["mrp"], flight["rate"], flight["force"], strict=False):
         assert np.array_equal(controller.step(t, mrp=mrp, rate=rate)["force"], pulses)
     craft: Any = mission.craft
-    said = pointing_checks.checks(craft, mission, mission.scheme())
+    said = pointing_checks.checks(craft, mission, mission.scheme(), np.radians(0.2))
     assert "authority.pulse_limit_cycle" not in [check.name for check in said]  # nothing is promised of those that wait
 
 
@@ -239,7 +239,7 @@ def test_the_limit_cycle_that_is_checked_bounds_the_flown_one(least_on):
     }
     mission = casadi_gnc.load(PULSES, changes={**PINV, **changes})
     craft: Any = mission.craft
-    (check,) = pointing_checks.checks(craft, mission, mission.scheme())
+    (check,) = pointing_checks.checks(craft, mission, mission.scheme(), np.radians(0.2))
     assert check.verdict == ("ok" if least_on == LEAST else "warn")
     late = casadi_gnc.fly(mission, decimation=1)["mrp"][1500:]
     swing = 4 * np.degrees(np.linalg.norm(late - late.mean(axis=0), axis=1).max())

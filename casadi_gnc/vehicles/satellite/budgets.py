@@ -72,27 +72,41 @@ def reach(axes: np.ndarray, most: np.ndarray, direction: np.ndarray | None = Non
     return found
 
 
+def on_reference(craft: SatelliteCraft, times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what a satellite on its reference is at K times [s], and what acts on it but its parts.
+
+    Returns
+    -------
+    torques, attitudes, rates : from outside, (K, 3), [N m]; inertial -> body, (K, 3, 3); (K, 3), [rad/s]; body axes.
+    """
+    plant, t = craft.plant(), ca.SX.sym("t")
+    place = (ca.SX.zeros(3), ca.SX.zeros(3)) if craft.orbit is None else Orbit(craft.orbit.elements()).at(t)
+    around = SimpleNamespace(position=place[0], velocity=place[1])
+    wanted = plant.reference.at(t, around)
+    attitude: Any = ca.SX(wanted.quaternion)
+    rest = {signal.name: ca.DM.zeros(signal.size) for signal in plant.assembly.state.signals}
+    now = SimpleNamespace(mrp=quaternions.to_mrp(attitude), rate=ca.SX(wanted.rate), **vars(around), **rest)
+    torque = plant.disturbance.at(t)
+    if craft.orbit is not None:
+        torque = torque + plant.surroundings.torque(now, plant.assembly.inertia(now))
+    if plant.surroundings.plates:
+        felt = plant.surroundings.felt(t, now)
+        torque = torque + plant.surroundings.pushed(now, felt, plant.assembly.centre(now))[1]
+    turning = quaternions.dcm(attitude).T  # the transpose, for Fortran's order is C's of that
+    found: Any = ca.Function("there", [t], [torque, ca.vec(turning), ca.SX(wanted.rate)]).map(len(times))(times[None])
+    torques, attitudes, rates = (np.array(ca.DM(each).full()).T for each in found)
+    return torques, attitudes.reshape(-1, 3, 3), rates
+
+
 def disturbance_over_orbit(craft: SatelliteCraft) -> tuple[np.ndarray, np.ndarray]:
     """Return times of one revolution, (K,), [s], and the momentum that torques from outside leave, (K, 3), inertial.
 
     The satellite is on its reference; what its parts do is left out.
     """
     assert craft.orbit is not None
-    elements, plant, t = craft.orbit.elements(), craft.plant(), ca.SX.sym("t")
-    position, velocity = Orbit(elements).at(t)
-    wanted = plant.reference.at(t, SimpleNamespace(position=position, velocity=velocity))
-    attitude: Any = ca.SX(wanted.quaternion)
-    rest = {signal.name: ca.DM.zeros(signal.size) for signal in plant.assembly.state.signals}
-    now = SimpleNamespace(
-        mrp=quaternions.to_mrp(attitude), rate=ca.SX(wanted.rate), position=position, velocity=velocity, **rest
-    )
-    torque = plant.disturbance.at(t) + plant.surroundings.torque(now, plant.assembly.inertia(now))
-    if plant.surroundings.plates:
-        around = plant.surroundings.felt(t, now)
-        torque = torque + plant.surroundings.pushed(now, around, plant.assembly.centre(now))[1]
-    felt = ca.Function("felt", [t], [ca.mtimes(quaternions.dcm(attitude).T, torque)])
-    times = np.linspace(0, elements.period, _POINTS + 1)
-    torques = np.array(felt.map(len(times))(times[None])).T
+    times = np.linspace(0, craft.orbit.elements().period, _POINTS + 1)
+    torques, attitudes, _ = on_reference(craft, times)
+    torques = np.einsum("kij,ki->kj", attitudes, torques)
     steps = np.diff(times)[:, None] * (torques[1:] + torques[:-1]) / 2
     return times, np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 

@@ -10,7 +10,7 @@ from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
-from . import budgets, pointing_checks
+from . import budgets, pointing_checks, standing_checks
 
 if TYPE_CHECKING:
     from .craft import SatelliteCraft
@@ -24,7 +24,9 @@ _STABLE = 2.785
 def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield momentum, slews and coils, and whether modes and liquids are slow enough for sampling and integrator."""
     yield from budgets.checks(craft, mission)
-    yield from pointing_checks.checks(craft, mission, scheme)
+    if (limit := pointing_checks.wanted(mission)) is not None:
+        yield from pointing_checks.checks(craft, mission, scheme, limit)
+        yield from standing_checks.checks(craft, mission, scheme, limit)
     timing = mission.timing
     step = timing.sample_period / timing.substeps
     rising = [each.rise_time_s for each in craft.thruster if each.rise_time_s > 0]

@@ -55,11 +55,8 @@ def wanted(mission: Mission) -> float | None:
     return min(found, default=None)
 
 
-def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
-    """Yield the limit cycle of pulses and the noise of sensors, against the pointing that the mission wants."""
-    limit = wanted(mission)
-    if limit is None:
-        return
+def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme, limit: float) -> Iterator[Check]:
+    """Yield the limit cycle of pulses and the noise of sensors, against the pointing [rad] that the mission wants."""
     still, own = held(mission, scheme)
     # Where valves wait for their turn, impulses are not within half a least bit: nothing is promised.
     if scheme.actuation.modulation is not None and craft.valves is None and still.target:
