@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import print_json, tell
+from casadi_gnc.cli.manners import Ending, Figures, Format, print_json, tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
+    from casadi_gnc.missions.mission import Mission
     from casadi_gnc.tuning.broken_case import Break, Moved
     from casadi_gnc.tuning.falsified import Falsified
 
@@ -53,6 +54,8 @@ def falsify(
     radius: Annotated[float, typer.Option(help="Of that set, in standard deviations of what is normal.")] = 4.0,
     flights: Annotated[int, typer.Option(min=1, help="At most.")] = 1000,
     seed: Annotated[int, typer.Option(min=0, help="Of the plan.")] = 0,
+    figures: Figures = None,
+    ending: Format = Ending.png,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
@@ -62,6 +65,7 @@ def falsify(
     same command goes on.
     """
     from casadi_gnc.problem_files.loading import load
+    from casadi_gnc.system.files import prepare_folder
     from casadi_gnc.tuning.claims import Claimant
     from casadi_gnc.tuning.falsifying import falsify as look
 
@@ -82,10 +86,13 @@ def falsify(
             threads=threads,
             told=told,
         )
+    drawn = None if figures is None else _draw(mission, found, prepare_folder(figures) / f"falsify.{ending.value}")
     if json:
         print_json(found.as_data())
     else:
         _print(found)
+        if drawn is not None:
+            typer.echo(f"wrote {drawn}")
     if found.known:
         tell(f"{found.known} of the flights were known from {file}.journal")
     if found.broken is not None:
@@ -110,6 +117,16 @@ def _values(told: list[str]) -> dict[str, list[Any]]:
                 f"--over is {each!r}; expected KEY=VALUE,VALUE,..., values as in the file, or allocation, theorem"
             )
     return found
+
+
+def _draw(mission: Mission, found: Falsified, target: Path) -> Path:
+    from casadi_gnc.missions.flying import fly
+    from casadi_gnc.reports.falsify_picture import draw
+
+    steps = [(each.did, each.flights, each.robustness, each.distance) for each in found.path]
+    flights = [] if found.broken is None else [fly(mission, found.scheme), found.broken.flight]
+    title = f"{mission.title or mission.name}: {found.requirement.id}"
+    return draw(title, found.requirement, steps, found.way, flights, target, unit=found.unit)
 
 
 def _print(found: Falsified) -> None:

@@ -27,6 +27,7 @@ class Falsified:
     minimal : a break with as few dispersions as were found to do.
     proved : what is proved of the linear loop, None where a break was found.
     path : where the search was, from the nominal to the smallest break.
+    way : distance and robustness at eighths of the straight way to the smallest break; empty without.
     first : flights until the first break; None without.
     left, left_at, left_distance : the least robustness of all flights, what differs there, and how far away it is.
     flights, known : in all, and how many of them an earlier run had flown.
@@ -44,6 +45,7 @@ class Falsified:
     minimal: Break | None
     proved: Certificate | None
     path: tuple[Step, ...]
+    way: tuple[tuple[float, float], ...]
     first: int | None
     left: float
     left_at: tuple[Moved, ...]
@@ -112,6 +114,7 @@ class Falsified:
                 }
                 for each in self.path
             ],
+            "way": [{"distance": distance, "robustness": _word(value)} for distance, value in self.way],
             "notes": list(self.notes),
         }
 

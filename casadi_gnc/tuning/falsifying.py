@@ -30,7 +30,7 @@ from casadi_gnc.tuning.journal import Journal
 from casadi_gnc.tuning.objective import Objective
 from casadi_gnc.tuning.reach import Kind, Reach
 from casadi_gnc.tuning.searching import branches, search
-from casadi_gnc.tuning.shrinking import fewest, smallest
+from casadi_gnc.tuning.shrinking import fewest, smallest, way_to
 
 #: Builds that `over` may ask for.
 _MOST_BUILDS = 32
@@ -109,9 +109,10 @@ def falsify(
     ]
     notes += _complete(searched)
     broken = minimal = None
+    way = ()
     if trial is not None:
         near = smallest(searched, reach, trial, seed, effort)
-        few = fewest(searched, reach, near)
+        few, way = fewest(searched, reach, near), way_to(searched, near)
         said = [f"found by casadi-gnc falsify after {first} flights"]
         for at in (near, trial):
             try:
@@ -144,6 +145,7 @@ def falsify(
         minimal=minimal,
         proved=proved,
         path=tuple(searched.path),
+        way=way if broken is not None else (),
         first=first,
         left=least.value,
         left_at=moved_of(space, least, changes, {}),

@@ -70,6 +70,22 @@ def _on_the_way(flights: Flights, broken: Trial) -> Trial:
     return best
 
 
+def way_to(flights: Flights, broken: Trial) -> tuple[tuple[float, float], ...]:
+    """Return distance and number at eighths of the straight way from the nominal to a break, both ends included.
+
+    None of them where a break is one by choices alone, or the budget does not allow their flights.
+    """
+    start = np.where(flights.space.discrete, broken.point, flights.space.start)
+    if np.isnan(broken.point[~flights.space.discrete]).any() or not _size(flights, broken) > 0:
+        return ()
+    points = start + np.linspace(0.0, 1.0, _SIDE_BY_SIDE + 1)[:, None] * (broken.point - start)
+    try:
+        values = flights.fly(broken.of, points)
+    except SpentError:
+        return ()
+    return tuple(zip(flights.space.distance(points).tolist(), values.tolist(), strict=True))
+
+
 def _closer(flights: Flights, reach: Reach, at: Trial, seed: int, effort: Effort) -> Trial | None:
     """Return a break that is nearer to the nominal, on the boundary of its own way; None where none is found."""
     space = flights.space

@@ -11,8 +11,9 @@ from casadi_gnc.allocation.attainable_plots import plot_slices
 from casadi_gnc.campaigns.statistics import percentile
 from casadi_gnc.checking import check
 from casadi_gnc.checking.broken_loops import scheme_margins
+from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.problem_files.allocation_file import load_allocation
-from casadi_gnc.reports import campaign_pictures, check_picture, flight_pictures, margins_picture
+from casadi_gnc.reports import campaign_pictures, check_picture, falsify_picture, flight_pictures, margins_picture
 from casadi_gnc.system import pictures
 
 #: What the eye without one kind of cone sees of linear red, green and blue (G. M. Machado, M. M. Oliveira,
@@ -57,6 +58,10 @@ def made(folder, detumble, ending):
     scheme = detumble.scheme("observer_pinv")
     drawn.append(check_picture.draw(detumble.title, check(detumble, scheme.name), folder / f"checks.{ending}"))
     drawn.append(margins_picture.draw(detumble.title, [scheme_margins(detumble, scheme)], folder / f"margins.{ending}"))
+    asked = Requirement("SLOW", formula="always[5, 15](norm(rate) <= 0.9)")
+    steps, way = [("nominal", 1, 0.1, 0.0), ("boundary", 20, -1e-3, 2.0)], [(0.0, 0.1), (1.0, 0.05), (2.0, -1e-3)]
+    target = folder / f"falsify.{ending}"
+    drawn.append(falsify_picture.draw(detumble.title, asked, steps, way, flights, target, unit="rad/s"))
     case = load_allocation("huang2020/allocation")
     drawn.append(plot_slices(case.physical, folder / f"attainable.{ending}", wanted=case.torque_limit))
     values = np.random.default_rng(1).normal(100, 10, 200)
@@ -77,7 +82,7 @@ def test_letters_stay_legible_in_a_column_and_nothing_runs_out(detumble, tmp_pat
     monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (write(self, *a, **k), figures.append(self))[0])
     with rc_context({"svg.fonttype": "none"}):
         drawn = made(tmp_path, detumble, "svg")
-    assert len(drawn) == len(figures) == 8
+    assert len(drawn) == len(figures) == 9
     for path, figure in zip(drawn, figures, strict=True):
         text = path.read_text(encoding="utf-8")
         width = float(re.search(r'width="([\d.]+)pt"', text)[1])

@@ -81,6 +81,14 @@ class Step(TypedDict):
 
 
 @_TOLD
+class Place(TypedDict):
+    """A flight on the straight way to a break."""
+
+    distance: float
+    robustness: float | str
+
+
+@_TOLD
 class Certificate(TypedDict):
     """What is proved for every dispersion in a box that contains the set."""
 
@@ -115,6 +123,8 @@ class Falsification(TypedDict):
     least: Least
     effort: Effort
     path: list[Step]
+    way: list[Place]
+    """Eighths of the straight way from the file's own numbers to the smallest break; empty without."""
     notes: list[str]
 
 

@@ -156,7 +156,7 @@ class Requirement:
             of = of.metrics if self.metric else of.signals
         if self.metric:
             return float(self.margins(of))
-        layout, samples, period = _record(of, self.id)
+        layout, samples, period = record_of(of, self.id)
         return robustness_of(self, layout, samples, period)
 
     def verdict(self, of: Flight | Mapping[str, Any], unit: str = "") -> Verdict:
@@ -272,7 +272,7 @@ def unbounded(robustness: Any) -> float:
     return math.copysign(math.inf, value) if abs(value) >= BEYOND else value
 
 
-def _record(signals: Mapping[str, Any], whose: str) -> tuple[Layout, np.ndarray, float]:
+def record_of(signals: Mapping[str, Any], whose: str) -> tuple[Layout, np.ndarray, float]:
     """Return layout, rows and period of a record given by signals."""
     if "time" not in signals:
         raise RequirementError(
