@@ -10,9 +10,10 @@ from typing import Any
 
 from casadi_gnc.campaigns.cases import Cases, cases_of
 from casadi_gnc.campaigns.dispersions import DispersionTable
+from casadi_gnc.campaigns.ledger import IDENTITY, read_identity
 from casadi_gnc.campaigns.plan import Plan
 from casadi_gnc.campaigns.result import Campaign
-from casadi_gnc.campaigns.store import has_arrow, read_identity
+from casadi_gnc.campaigns.store import has_arrow
 from casadi_gnc.embedded.printer import Math
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.missions.mission import Mission
@@ -76,7 +77,10 @@ def opened(mission: Mission, folder: Path) -> Campaign:
     if identity["dispersions"] is None or identity["plan_name"] is None:
         what = "plan" if identity["plan_name"] is None else "dispersions"
         raise CampaignError(f"{folder}: its {what} came from Python and not from a file; run it again there to open it")
-    varying = [DispersionTable(**table) for table in identity["dispersions"]]
+    try:
+        varying = [DispersionTable(**table) for table in identity["dispersions"]]
+    except (TypeError, ValueError) as error:
+        raise CampaignError(f"{folder / IDENTITY} is damaged: its dispersions are none") from error
     origin = mission.origin
     here = mission if origin is None else mission.read_from(dataclasses.replace(origin, folder=folder))
     cases = cases_of(here, varying, identity["plan_name"], identity["cases"], identity["seed"], identity["scheme"])

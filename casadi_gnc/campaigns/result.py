@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from casadi_gnc.campaigns.cases import Cases
-from casadi_gnc.campaigns.store import MISSING, SHORT, WHOLE, Columns, Store, read_identity, shards
+from casadi_gnc.campaigns.ledger import read_identity
+from casadi_gnc.campaigns.store import MISSING, SHORT, WHOLE, Columns, Store, shards
 from casadi_gnc.campaigns.summary import badness, summarised
 from casadi_gnc.errors import CampaignError, offer
 from casadi_gnc.missions.flight import Flight
@@ -167,9 +168,16 @@ class Campaign:
         number = self._number(str(told))
         place = np.flatnonzero(self.column("case") == number)
         if not len(place):
-            raise CampaignError(f"case {number} is not kept; there are cases 0 to {self.identity['cases'] - 1}")
+            raise CampaignError(f"case {number} is not kept: {self._why_not(number)}")
         row = {name: self.column(name)[place[0]].item() for name in self.names if name != "refused"}
         return Case(number, row, self.cases)
+
+    def _why_not(self, number: int) -> str:
+        """Return why a case has no row."""
+        if number >= self.identity["cases"]:
+            return f"there are cases 0 to {self.identity['cases'] - 1}"
+        state = self._states[number // self.identity["shard"]]
+        return f"{'it is not flown yet' if state in (WHOLE, MISSING, SHORT) else state}; run the campaign again"
 
     def _number(self, told: str) -> int:
         if told.isdecimal():

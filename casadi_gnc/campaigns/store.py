@@ -6,7 +6,8 @@ file                     content
 campaign.json            identity: mission, scheme, plan, seed, dispersions, code and versions; number of cases
 problem.toml, *.py       what the mission was read from, where it was read
 shard-00000.parquet      a row a case, in order (`.npz` without pyarrow)
-shard-00000.json         cases of the shard and the hash of its file; written last, so that it stands for a whole one
+shard-00000.json         which campaign and cases the shard is of, and the hash of its file; written last, so that it
+                         stands for a whole one
 kept/                    whole records of some cases, where they were asked for
 =======================  ==================================================================================
 
@@ -18,16 +19,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from casadi_gnc.campaigns.ledger import IDENTITY, entry_of, name_of, read_entry, read_identity, short
 from casadi_gnc.errors import CampaignError
 from casadi_gnc.system.files import prepare_folder, write_beside
 
-IDENTITY = "campaign.json"
 #: States of a shard: as it should be; not flown; without its last cases, for the campaign has grown.
 WHOLE, MISSING, SHORT = "whole", "missing", "short"
 #: A table: columns by name, of one length.
@@ -75,8 +77,8 @@ class Store:
             fixed = apart == ["plan"] and known["plan_name"] == asked["plan_name"] and known["cases"] != asked["cases"]
             why = "such a plan is made for its number of cases and cannot grow; " if fixed else ""
             raise CampaignError(
-                f"{self.folder} holds another campaign: its {apart[0]} is {_short(known.get(apart[0]))}, and this "
-                f"one's is {_short(asked[apart[0]])}; {why}give another folder"
+                f"{self.folder} holds another campaign: its {apart[0]} is {short(known.get(apart[0]))}, and this "
+                f"one's is {short(asked[apart[0]])}; {why}give another folder"
             )
         if asked["cases"] < known["cases"]:
             raise CampaignError(
@@ -93,7 +95,7 @@ class Store:
         """Keep a shard."""
         place = self.place(shard)
         write_beside(place, lambda path: _write(path, columns, self.suffix))
-        entry = {"first": int(columns["case"][0]), "cases": len(columns["case"]), "sha256": _hash(place)}
+        entry = entry_of(self.identity, int(columns["case"][0]), len(columns["case"]), _hash(place))
         _put_text(place.with_suffix(".json"), json.dumps(entry) + "\n")
 
     def state(self, shard: int) -> str:
@@ -103,32 +105,27 @@ class Store:
         if not entry.exists():
             return MISSING
         try:
-            told = json.loads(entry.read_text(encoding="utf-8"))
-            found, cases = _hash(place), int(told["cases"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            return f"{place.name} cannot be read: {error}"
-        if told.get("sha256") != found:
+            told, found = read_entry(entry), _hash(place)
+        except CampaignError as error:
+            return str(error)
+        except OSError as error:
+            return f"{place.name} cannot be read: {error.strerror or error}"
+        if told["sha256"] != found:
             return f"{place.name} is not what was written: its hash differs"
-        size = self.identity["shard"]
+        size, cases = self.identity["shard"], told["cases"]
+        if told["campaign"] != name_of(self.identity) or told["first"] != shard * size:
+            return f"{place.name} holds other cases: it was copied from another campaign, or renamed"
         return WHOLE if cases == min(size, self.identity["cases"] - shard * size) else SHORT
 
     def read(self, shard: int, names: list[str] | None = None) -> Columns:
-        """Return the columns of a shard, all or those named."""
-        return _read(self.place(shard), names)
-
-
-def read_identity(folder: Path) -> dict[str, Any]:
-    """Return what a folder holds a campaign of; raise `CampaignError` where it holds none."""
-    place = folder / IDENTITY
-    try:
-        found = json.loads(place.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise CampaignError(f"{str(folder)!r} holds no campaign: it has no {IDENTITY}") from None
-    except (OSError, ValueError) as error:
-        raise CampaignError(f"{place} cannot be read: {error}") from error
-    if not isinstance(found, dict) or found.get("format") != 1 or found.get("table") not in ("parquet", "npz"):
-        raise CampaignError(f"{place} is no campaign of format 1")
-    return found
+        """Return the columns of a shard, all or those named; raise `CampaignError` where it is no such table."""
+        place = self.place(shard)
+        try:
+            return _read(place, names)
+        except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
+            raise CampaignError(
+                f"{place} is no table of this campaign; delete it and run the campaign again"
+            ) from error
 
 
 def shards(identity: dict[str, Any]) -> Iterator[tuple[int, int, int]]:
@@ -143,7 +140,7 @@ def keep_texts(folder: Path, texts: dict[str, str]) -> None:
     for name, text in texts.items():
         place = folder / name
         place.parent.mkdir(parents=True, exist_ok=True)
-        if not place.exists():
+        if not place.exists() or place.read_bytes() != text.encode():
             _put_text(place, text)
 
 
@@ -180,8 +177,3 @@ def _read(place: Path, names: list[str] | None) -> Columns:
 def _numpy(column: Any) -> np.ndarray:
     array = column.to_numpy()
     return np.array([value or "" for value in array], dtype=object) if array.dtype == object else array
-
-
-def _short(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -203,7 +203,7 @@ def open_campaign(folder: str | Path) -> Campaign:
         For a folder without campaign, or one of a mission that was made from objects, whose code is not in the folder.
     """
     from casadi_gnc.campaigns.identity import opened
-    from casadi_gnc.campaigns.store import read_identity
+    from casadi_gnc.campaigns.ledger import read_identity
 
     place = Path(folder)
     identity = read_identity(place)
