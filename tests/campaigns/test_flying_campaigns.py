@@ -469,7 +469,7 @@ def tables(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("kills", [pytest.param(4, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("kills", [pytest.param(3, marks=pytest.mark.slow), pytest.param(100, marks=pytest.mark.long)])
 def test_killed_at_any_moment_and_run_again_the_tables_are_those_of_an_undisturbed_run(problem, tmp_path, kills):
     subprocess.run(in_small_shards(problem, tmp_path / "calm"), check=True, capture_output=True)
     halfway = killed(problem, tmp_path / "killed", tmp_path / "calm", kills, random.Random(kills))
