@@ -16,7 +16,7 @@ from casadi_gnc.embedded import flight_function, package
 from casadi_gnc.embedded.compare import as_words
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.flight_function import FlightFunction
-from casadi_gnc.embedded.function_source import common
+from casadi_gnc.embedded.function_source import common, function_files
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import MOST_STEPS, digest
 from casadi_gnc.embedded.members import access
@@ -189,6 +189,7 @@ def _readme(
         spoiled=about["spoiled"],
         rate=f"{own.period:g}" if own.period else "",
         ports={"inputs": list(own.inputs.signals), "outputs": list(own.outputs.signals)},
+        solvers=any("_allocate" in path for path in function_files(own, options)),
         initial=[{"name": name, "value": f"{value:.9g}"} for name, value in initial.items()],
         measured=measured,
         size=size,

@@ -24,6 +24,10 @@ STATUSES = {
     4: ("SINGULAR", "a linear system has no solution: outputs and state are those of the last good step"),
     8: ("NOT_INITIALISED", "the state was not initialised, or is damaged: outputs are zero"),
     16: ("STATE_DAMAGED", "the state was changed between two steps, as its checksum shows: outputs are zero"),
+    64: (
+        "UNCERTIFIED",
+        "a quadratic program has no certified answer: all is as after the last good step",
+    ),
 }
 #: The bit beside them of functions with a period and a time.
 _TIME_SHIFTED = ("TIME_SHIFTED", "the time did not advance by the period; the step was taken all the same")
@@ -94,7 +98,7 @@ class FlightFunction:
     @property
     def statuses(self) -> dict[int, tuple[str, str]]:
         """What the status of a step can say, by bit."""
-        return {**STATUSES, 32: _TIME_SHIFTED} if self.is_clocked else STATUSES
+        return dict(sorted({**STATUSES, 32: _TIME_SHIFTED}.items())) if self.is_clocked else STATUSES
 
     @property
     def replayed(self) -> Layout:

@@ -47,8 +47,8 @@ class FunctionMachine:
             given.append(ca.reshape(ca.DM(values), *function.size_in(i)))
         try:
             results = dict(zip(function.name_out(), function.call(given), strict=True))
-        except RuntimeError:  # what CasADi says of a singular matrix
-            return _BITS["SINGULAR"]
+        except RuntimeError:  # what CasADi says of a singular matrix, and of a quadratic program that it gave up
+            return _BITS["UNCERTIFIED" if self._parts.solvers else "SINGULAR"]
         found = {name: np.array(ca.vec(value)).ravel() for name, value in results.items()}
         outputs = np.concatenate([np.zeros(0), *(found[name] for name in own.outputs.names)])
         after = np.concatenate([np.zeros(0), *(found[own.pairs[name]] for name in own.state.names)])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 from casadi_gnc.embedded.controller import Options
@@ -9,7 +10,8 @@ from casadi_gnc.embedded.flight_function import FlightFunction, to_text
 from casadi_gnc.embedded.manifest import digest
 from casadi_gnc.embedded.members import access, declaration
 from casadi_gnc.embedded.parts import Parts
-from casadi_gnc.embedded.source import numbers
+from casadi_gnc.embedded.quadratic import solver_name
+from casadi_gnc.embedded.source import numbers, solver_units
 from casadi_gnc.signals import Layout
 from casadi_gnc.system import assets
 from casadi_gnc.system.templates import template
@@ -27,13 +29,20 @@ def function_files(own: FlightFunction, options: Options) -> dict[str, str]:
     PrinterError
         For what has no C form: the node, where it comes from, and what to do.
     """
+    return dict(_files(own, options))
+
+
+@lru_cache(maxsize=1)
+def _files(own: FlightFunction, options: Options) -> dict[str, str]:
     parts = Parts(options.maths, options.real, options.name.upper())
     callee = parts.function(own.function, titles=_titles(own))
     about = common(own, options)
+    solvers = _solvers(parts, options)
     source = template("function_source.c.j2").render(
         **about,
         maths=options.maths,
         parts=parts.text(),
+        solvers=[template("package_sizes.j2").render(**one, real=options.real) for one in solvers],
         call=f"{callee.name}({', '.join(_arguments(own) + (['&now.outputs.status'] if callee.asks else []))});",
         given=_finite(own.inputs, "input->"),
         found=_finite(own.outputs, "now->outputs.") + _finite(own.state, "now->after."),
@@ -47,8 +56,22 @@ def function_files(own: FlightFunction, options: Options) -> dict[str, str]:
     if options.maths == "gnc":
         maths += ["gnc_mathf.h"] if options.real == "float" else ["gnc_math.h", "gnc_mathf.h"]
     files = {f"{options.name}.h": template("function_header.h.j2").render(**about), f"{options.name}.c": source}
+    if solvers:
+        maths = ["gnc_arithmetic.h", "gnc_mathf.h", *(["gnc_math.h"] if options.real == "double" else [])]
+        maths += ["gnc_allocate.h", "gnc_allocate_internal.h"]
     files |= {name: (runtime / name).read_text(encoding="utf-8") for name in maths}
+    for one in solvers:
+        stem = one["name"].replace(options.name, f"{options.name}_allocate", 1)
+        files |= solver_units(one["allocation"], options, one["name"], stem)
     return {**files, "LICENSE": (assets.folder("codegen") / "LICENSE").read_text(encoding="utf-8")}
+
+
+def _solvers(parts: Parts, options: Options) -> list[dict[str, Any]]:
+    """Return prefix and sizes of each on-board solver that is called."""
+    return [
+        {"name": solver_name(options.name, (n, r)), "allocation": {"N": n, "R": r, "P": 0, "V": 1}}
+        for n, r in sorted(parts.solvers)
+    ]
 
 
 def common(own: FlightFunction, options: Options) -> dict[str, Any]:

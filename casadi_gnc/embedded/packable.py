@@ -188,7 +188,8 @@ class PackableFunction:
         header = self.replay_header(options, len(inputs))
         what = "inputs and answers of the function"
         what += f", the last {spoiled} with bad inputs" if spoiled else ""
-        return package.replay_texts(options, [f"{options.name}.c"], header, inputs, outputs, what)
+        units = [path for path in self.files(options) if path.endswith(".c")]
+        return package.replay_texts(options, units, header, inputs, outputs, what)
 
     def on_the_machine(self, rows: np.ndarray) -> np.ndarray:
         """Return what CasADi's machine gives."""

@@ -17,6 +17,7 @@ from casadi_gnc.embedded.pieces import Piece, node_piece, table_piece
 from casadi_gnc.embedded.printer import comment
 from casadi_gnc.embedded.program_text import declare, print_program
 from casadi_gnc.embedded.programs import Callee, Port, Program
+from casadi_gnc.embedded.quadratic import quadratic_piece
 from casadi_gnc.embedded.scalars import Math, Real, c_constant
 from casadi_gnc.embedded.tables import read_table
 from casadi_gnc.errors import PrinterError
@@ -31,12 +32,17 @@ class Parts:
     ----------
     maths, real : as for `print_program`.
     status : macro prefix of the package, whose bit SINGULAR a linear system raises.
+
+    Attributes
+    ----------
+    solvers : unknowns and squares of the on-board solvers that are called.
     """
 
     maths: Math = "gnc"
     real: Real = "double"
     status: str = "GNC"
     texts: list[str] = field(default_factory=list)
+    solvers: set[tuple[int, int]] = field(default_factory=set)
     _known: dict[tuple[object, ...], Callee] = field(default_factory=dict)
     _names: set[str] = field(default_factory=set)
     _functions: list[tuple[ca.Function, Callee]] = field(default_factory=list)
@@ -90,6 +96,11 @@ class Parts:
             return self._loop(function, place)
         if kind in ("LinearInterpolant", "LinearInterpolantJac", "BSplineInterpolant"):
             return self._piece(table_piece(read_table(function, place), function.name(), place, self.real))
+        if programs.wraps_quadratic(function) and "lam_p" in function.name_out():
+            raise PrinterError(
+                f"{place} is a quadratic program itself, whose result lam_p is no number; make a function of what is "
+                f"wanted, casadi.Function(..., [p, ...], [{function.name()}(p=p, lbx=..., ubx=...)['x']])"
+            )
         if function.is_a("MXFunction"):
             self._count(function)
         made = programs.program(function, place, self._is_kept, self._printed)
@@ -118,6 +129,8 @@ class Parts:
 
     def _printed(self, function: ca.Function, k: int, place: str) -> Callee:
         node = function.instruction_MX(k)
+        if programs.is_quadratic(function, k):
+            return self._piece(quadratic_piece(function, k, place, self.maths, self.real, self.status.lower()))
         if function.instruction_id(k) == ca.OP_CALL:
             return self.function(node.which_function(), place)
         return self._piece(node_piece(node, place, self.real))
@@ -172,6 +185,7 @@ class Parts:
             self._dimensions = max(self._dimensions, piece.dimensions)
             self._degree = max(self._degree, piece.degree)
             self._used.update(piece.helpers)
+            self.solvers.update([piece.solver] if piece.solver else [])
             self._known[piece.text] = self._add(piece.name, piece.inputs, piece.outputs, piece.asks, list(piece.lines))
         return self._known[piece.text]
 

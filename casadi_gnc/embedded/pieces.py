@@ -33,6 +33,7 @@ class Piece:
     helpers : what of the template it calls.
     asks : whether the last argument is the status.
     dimensions, degree : of the table, for which the helper has room.
+    solver : unknowns and squares of the on-board solver that it calls.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Piece:
     asks: bool = False
     dimensions: int = 1
     degree: int = 1
+    solver: tuple[int, int] | None = None
 
     @property
     def text(self) -> tuple[object, ...]:

@@ -37,7 +37,7 @@ _OUTSIDE = "its C is not CasADi's to print; call it beside the package, and pass
 #: What to do about functions that are no expressions, by their class or what CasADi says that they are.
 _REMEDIES = {
     "Nlpsol": "nonlinear programs have no bounded time on board; solve it on the ground, and pass what it gives",
-    "Conic": "state the problem as an allocation file, whose solver flies, or pass what it gives",
+    "Conic": "call it in a function of its own, casadi.Function(..., [g, lower, upper], [solver(...)[...]])",
     **dict.fromkeys(("Newton", "FastNewton", "KinsolInterface", "ImplicitToNlp"), _ROOTS),
     **dict.fromkeys(("RungeKutta", "Collocation", "CvodesInterface", "IdasInterface"), _STEPS),
     **dict.fromkeys(("External", "GenericExternal"), _OUTSIDE),
@@ -92,6 +92,12 @@ class Program:
     def asks(self) -> bool:
         """Whether a call in it may have something to say in the status."""
         return any(call.callee.asks for call in self.calls)
+
+
+#: What a quadratic program is given on board: gradient and bounds, of CasADi's h, g, a, lba, uba, lbx, ubx, ...
+_GRADIENT, _LOWER, _UPPER = 1, 5, 6
+#: A bound that nothing meets; infinite ones are no numbers of C.
+_BEYOND = 1e30
 
 
 def ports(function: ca.Function) -> tuple[tuple[Port, ...], tuple[Port, ...]]:
@@ -202,16 +208,14 @@ def program(function: ca.Function, place: str, is_kept: Callable[[ca.Function], 
     if not (function.is_a("MXFunction") or function.is_a("SXFunction")):
         raise refuse(function, place)
     given = function.mx_in()
-    results = _opened(function).call(given, True, False)
-    flat = ca.Function("flat", given, results)
+    flat, results = _without_wrappers(given, _opened(function).call(given, True, False))
     cut, names, arguments, callees, arrays = [], [], [], [], []
     for k in range(flat.n_instructions()):
         pieces = _piece(flat, k, place, is_kept)
         if pieces is None:
             continue
-        node = flat.instruction_MX(k)
         callees.append(printed(flat, k, place))
-        arguments.append([node.dep(i) for i in range(node.n_dep())])
+        arguments.append(_arguments(flat, k))
         arrays.append(tuple(Port(f"r{len(arrays)}_{i}", piece.nnz()) for i, piece in enumerate(pieces)))
         cut += pieces
         names += [ca.MX.sym(port.name, piece.sparsity()) for port, piece in zip(arrays[-1], pieces, strict=True)]
@@ -240,6 +244,44 @@ def _piece(function: ca.Function, k: int, place: str, is_kept: Callable[[ca.Func
             return None
         return [node.get_output(i) for i in range(node.n_out())]
     return [node] if _is_piece(function, k) else None
+
+
+def is_quadratic(function: ca.Function, k: int) -> bool:
+    """Tell whether an instruction solves a quadratic program."""
+    return function.instruction_id(k) == ca.OP_CALL and function.instruction_MX(k).which_function().is_a("Conic")
+
+
+def wraps_quadratic(function: ca.Function) -> bool:
+    """Tell whether a function is what qpsol makes, or another one that solves a quadratic program itself."""
+    return function.is_a("MXFunction") and any(is_quadratic(function, k) for k in range(function.n_instructions()))
+
+
+def _without_wrappers(given: list[ca.MX], results: list[ca.MX]) -> tuple[ca.Function, list[ca.MX]]:
+    """Return a tape, and its results, in which quadratic programs stand themselves, not what qpsol makes around them.
+
+    That has a result that is no number (the multipliers of parameters), which is gone where nobody asks for it.
+    """
+    while True:
+        tape = ca.Function("flat", given, results)
+        nodes = [tape.instruction_MX(k) for k in range(tape.n_instructions()) if tape.instruction_id(k) == ca.OP_CALL]
+        nodes = [node for node in nodes if wraps_quadratic(node.which_function())]
+        if not nodes:
+            return tape, results
+        node = nodes[0]
+        inside = node.which_function().call([node.dep(i) for i in range(node.n_dep())], True, False)
+        outside = [node.get_output(i) for i in range(node.n_out())]
+        results = ca.graph_substitute(results, outside, inside)
+
+
+def _arguments(function: ca.Function, k: int) -> list[ca.MX]:
+    """Return what the C function of an instruction is given."""
+    node = function.instruction_MX(k)
+    if not is_quadratic(function, k):
+        return [node.dep(i) for i in range(node.n_dep())]
+    lower, upper = ca.densify(node.dep(_LOWER)), ca.densify(node.dep(_UPPER))
+    # What is no number stays none, so that the step is refused.
+    lower, upper = ca.if_else(lower < -_BEYOND, -_BEYOND, lower), ca.if_else(upper > _BEYOND, _BEYOND, upper)
+    return [ca.densify(node.dep(_GRADIENT)), lower, upper]
 
 
 def _scalars(

@@ -138,13 +138,16 @@ def allocator_files(controller: Controller, options: Options) -> dict[str, str]:
 
 def allocator_units(problem: AllocationProblem, options: Options) -> dict[str, str]:
     """Return the units of the allocator under the package's own names, so that two of them link into one image."""
-    sizes = template("package_sizes.j2").render(
-        name=options.name, real=options.real, allocation=allocation_sizes(problem)
-    )  # fmt: skip
+    return solver_units(allocation_sizes(problem), options, options.name, f"{options.name}_allocate")
+
+
+def solver_units(sizes: dict[str, int], options: Options, prefix: str, stem: str) -> dict[str, str]:
+    """Return the units of the on-board solver for sizes, its symbols and its files called after these names."""
+    macros = template("package_sizes.j2").render(name=prefix, real=options.real, allocation=sizes)
     runtime, files = assets.folder("codegen") / "runtime", {}
     for unit in online.units():
         text = (runtime / unit).read_text(encoding="utf-8")
-        files[unit.replace("gnc", options.name, 1)] = f"{_SIZED}{sizes}\n{text}"
+        files[unit.replace("gnc_allocate", stem, 1)] = f"{_SIZED}{macros}\n{text}"
     return files
 
 

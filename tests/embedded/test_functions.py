@@ -139,7 +139,7 @@ def refused() -> dict[str, tuple[ca.Function, str]]:
 
     return {
         "nlpsol": (within(nlp(x0=p, p=p)["x"], p), "outer, solver is of kind Sqpmethod, .* solve it on the ground"),
-        "conic": (conic, "quadratic is of kind Qrqp, .* allocation file"),
+        "conic": (conic, "quadratic is of kind Qrqp, .* call it in a function of its own"),
         "rootfinder": (within(root(p, p), p), "outer, root is of kind Newton, .* Newton steps in CasADi symbols"),
         "callback": (within(refused.mine(index), index), "outer, mine is of kind Callback, .* Python does not fly"),  # type: ignore[attr-defined]
         "solve": (
