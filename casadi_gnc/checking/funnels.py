@@ -182,9 +182,9 @@ def _needed_share(
         b_eq=known.ravel(),
         bounds=[*zip(lower, upper, strict=True), *[(None, None)] * (steps * count), (0, None)],
         method="highs",
-        options={"time_limit": programs.PATIENCE},
+        options=programs.PATIENCE,
     )
-    if found.status == 1:
+    if found.status == programs.UNSOLVED:
         return float("nan")  # nothing is known: no reason to fail
     return float(found.x[-1]) if found.status == 0 else float("inf")
 

@@ -11,10 +11,10 @@ import numpy as np
 
 #: Largest share that is looked for.
 _MOST = 1e6
-#: Seconds after which a program counts as unsolved: numbers hundreds of decades apart may never end.
-PATIENCE = 5.0
-_OPTIONS = {"time_limit": PATIENCE}
-_OUT_OF_TIME = 1
+#: Where a program counts as unsolved, for numbers hundreds of decades apart may never end: by iterations, so that what is
+#: found is the same on a busy machine, and by seconds where not even one ends.
+PATIENCE = {"maxiter": 50_000, "time_limit": 15.0}
+UNSOLVED = 1
 
 
 def largest_shares(matrix: np.ndarray, wanted: np.ndarray, lower: Any, upper: Any) -> np.ndarray:
@@ -41,11 +41,11 @@ def largest_shares(matrix: np.ndarray, wanted: np.ndarray, lower: Any, upper: An
         A_eq=sparse.hstack(parts, format="csr"),
         b_eq=np.zeros(wanted.size),
         bounds=[*zip(lower, upper, strict=True)] * count + [(0, _MOST)] * count,
-        options=_OPTIONS,
+        options=PATIENCE,
     )
     if found.status == 0:
         return np.array(found.x)[count * n :]
-    if found.status == _OUT_OF_TIME:
+    if found.status == UNSOLVED:
         return np.full(count, np.nan)
     # One that has no answer leaves all without one.
     return np.zeros(1) if count == 1 else np.hstack([largest_shares(matrix, w[None], lower, upper) for w in wanted])
@@ -76,11 +76,11 @@ def least_shares(bounds: np.ndarray, gain: np.ndarray, load: np.ndarray) -> np.n
         A_eq=sparse.hstack([sparse.block_diag(list(gain)), sparse.csr_array((load.size, count))], format="csr"),
         b_eq=-load.ravel(),
         bounds=[(None, None)] * (count * n) + [(0, None)] * count,
-        options=_OPTIONS,
+        options=PATIENCE,
     )
     if found.status == 0:
         return np.array(found.x)[count * n :]
-    if found.status == _OUT_OF_TIME:
+    if found.status == UNSOLVED:
         return np.full(count, np.nan)
     if count == 1:
         return np.array([np.inf])
