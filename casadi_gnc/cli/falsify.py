@@ -71,6 +71,7 @@ def falsify(
 
     mission = load(problem)
     file = out or Path("out") / f"{mission.name}-{requirement}.toml"
+    target = None if figures is None else prepare_folder(figures) / f"falsify.{ending.value}"
     with Progress("flights", quiet=json) as told:
         found = look(
             mission,
@@ -86,7 +87,7 @@ def falsify(
             threads=threads,
             told=told,
         )
-    drawn = None if figures is None else _draw(mission, found, prepare_folder(figures) / f"falsify.{ending.value}")
+    drawn = None if target is None else _draw(mission, found, target)
     if json:
         print_json(found.as_data())
     else:

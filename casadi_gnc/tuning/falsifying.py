@@ -6,7 +6,6 @@ nothing, but where every dispersion is a choice and all combinations were flown.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from importlib import metadata
@@ -19,21 +18,18 @@ from casadi_gnc.errors import CampaignError, ProblemError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.problem_files.by_name import mission_of
-from casadi_gnc.problem_files.loading import load_document
-from casadi_gnc.tuning.broken_case import Break, break_of, document_of, moved_of
+from casadi_gnc.tuning.broken_case import Break, break_of, moved_of
+from casadi_gnc.tuning.builds import builds_of
 from casadi_gnc.tuning.certificate import Certificate, certificate
 from casadi_gnc.tuning.claims import Claimant, claimed
 from casadi_gnc.tuning.descending import Effort
 from casadi_gnc.tuning.falsified import Falsified
-from casadi_gnc.tuning.flights import Build, Flights, Told, Trial
+from casadi_gnc.tuning.flights import Flights, Told, Trial
 from casadi_gnc.tuning.journal import Journal
-from casadi_gnc.tuning.objective import Objective
 from casadi_gnc.tuning.reach import Kind, Reach
 from casadi_gnc.tuning.searching import branches, search
 from casadi_gnc.tuning.shrinking import fewest, smallest, way_to
 
-#: Builds that `over` may ask for.
-_MOST_BUILDS = 32
 #: By how much a break whose own file does not break is moved away from the nominal.
 _FARTHER = (1.0, 1.002, 1.01, 1.05)
 
@@ -93,7 +89,7 @@ def falsify(
         )
     if flights < 1:
         raise CampaignError(f"{flights} flights are allowed; expected 1 or more")
-    builds = _builds(mission, chosen, requirement, dict(over or {}), claims, threads)
+    builds = builds_of(mission, chosen, requirement, dict(over or {}), claims, threads)
     space = builds[0].objective.space
     reach = Reach(space, within, radius)
     place = None if out is None else Path(out)
@@ -155,32 +151,6 @@ def falsify(
         effort=effort,
         notes=tuple(notes),
     )
-
-
-def _builds(
-    mission: Mission, scheme: str, requirement: str, over: dict[str, Sequence[Any]],
-    claims: Sequence[Claimant] = (), threads: int | None = None,
-) -> list[Build]:  # fmt: skip
-    """Return the mission and, for each combination of what `over` says, another."""
-    builds = [Build(lambda: Objective(mission, scheme, what=requirement, threads=threads))]
-    if not over:
-        return builds
-    document = document_of(mission)
-    if document is None or mission.origin is None:
-        raise CampaignError(f"{mission.name} was made from objects, and `over` changes a file; load one")
-    before = mission.origin.changes
-    count = math.prod(len(values) for values in over.values())
-    if count > _MOST_BUILDS:
-        raise CampaignError(f"`over` asks for {count} builds, expected at most {_MOST_BUILDS}; give fewer values")
-    for values in itertools.product(*over.values()):
-        changes = dict(zip(over, values, strict=True))
-
-        def make(changes: dict[str, Any] = changes) -> Objective:
-            other, _ = claimed(load_document(document, {**before, **changes}), scheme, claims)
-            return Objective(other, scheme, what=requirement, threads=threads)
-
-        builds.append(Build(make, changes))
-    return builds
 
 
 def _identity(

@@ -52,7 +52,10 @@ class Iterates:
 
     @staticmethod
     def _read(path: Path, identity: dict[str, Any]) -> list[dict[str, Any]]:
-        text = path.read_text(encoding="utf-8")
+        try:
+            text = path.read_bytes().decode(errors="replace")
+        except OSError as error:
+            raise OutputError(f"cannot read {str(path)!r}: {error.strerror or error}") from error
         whole = text[: text.rfind("\n") + 1]  # the last line of a run that was killed may be half written
         lines: list[Any]
         try:

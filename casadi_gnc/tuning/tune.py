@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +20,7 @@ from casadi_gnc.tuning.gain_flights import Case, Flights, planned
 from casadi_gnc.tuning.gains import Gains, gains_free
 from casadi_gnc.tuning.iterates import Iterates
 from casadi_gnc.tuning.outcome import Tuned, outcome
+from casadi_gnc.tuning.state import State, resumed
 from casadi_gnc.tuning.writing import refuse_target, write
 
 Against = Literal["nominal", "worst", "campaign"]
@@ -27,16 +28,6 @@ Against = Literal["nominal", "worst", "campaign"]
 _BETWEEN = 5
 #: Called with a sentence.
 Told = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class _State:
-    """Hold where a tuning is: the cases, the searches for worse ones that were made, the iterate, all costs so far."""
-
-    cases: list[Case]
-    searches: int
-    at: Iterate
-    course: list[tuple[float, str]]
 
 
 def tune(
@@ -126,23 +117,23 @@ def tune(
             worst=against != "campaign",
         )
 
-    state = _resumed(journal.kept)
+    state = resumed(journal.kept)
     if state is None:
         own = planned(mission, chosen, dispersions, plan, cases, seed) if against == "campaign" else [flights.nominal]
         if against == "worst":
             first = worst_case(flights, gains.start, float(flights.costs(gains.start[None, :], own)[0, 0]), seed)
             own += [] if first is None else [first[0]]
-        state = _State(own, 1, begin(problem_of(own), gains.start), [])
+        state = State(own, 1, begin(problem_of(own), gains.start), [])
         _refuse_flat(problem_of(own), state.at, gains)
         state.course.append((state.at.value, "start"))
-        journal.add(**_data(state))
+        journal.add(**state.data())
     elif told:
         told(f"goes on after iteration {state.at.number}")
     while True:
         until = min(iterations, state.at.number + _BETWEEN) if against == "worst" else iterations
         for at in descend(problem_of(state.cases), state.at, until, seed):
             state = replace(state, at=at, course=[*state.course, (at.value, at.how)])
-            journal.add(**_data(state))
+            journal.add(**state.data())
             if told:
                 told(f"iteration {at.number}: cost {at.value:.4g} ({at.how})")
         if against != "worst":
@@ -157,10 +148,10 @@ def tune(
             own = [*state.cases, worse[0]]
             again = begin(problem_of(own), state.at.z, radius=min(1.0, state.at.radius), number=state.at.number)
             again = replace(again, curvature=state.at.curvature)
-            state = _State(own, searches, again, [*state.course, (again.value, "a worse case")])
+            state = State(own, searches, again, [*state.course, (again.value, "a worse case")])
         else:
             state = replace(state, searches=searches)
-        journal.add(**_data(state))
+        journal.add(**state.data())
         if state.at.number >= iterations:
             break
     values = _rounded(problem_of(state.cases), flights, state, kept.margins, digits, lambda v: not _troubles(
@@ -217,7 +208,7 @@ def _refuse_flat(problem: Problem, at: Iterate, gains: Gains) -> None:
 
 
 def _rounded(
-    problem: Problem, flights: Flights, state: _State, margins: Callable[[np.ndarray], np.ndarray], digits: int,
+    problem: Problem, flights: Flights, state: State, margins: Callable[[np.ndarray], np.ndarray], digits: int,
     allowed: Callable[[np.ndarray], bool],
 ) -> np.ndarray:  # fmt: skip
     """Return the gains with so many digits, rounded to the side of the lowest cost that keeps the constraints."""
@@ -233,17 +224,3 @@ def _rounded(
         if (margins(near[i]) >= limit - 1e-9).all() and allowed(near[i]):
             return near[i]
     return best
-
-
-def _data(state: _State) -> dict[str, Any]:
-    cases = [{"values": one.values.tolist(), "seed": one.seed, "name": one.name} for one in state.cases]
-    return {"cases": cases, "searches": state.searches, "course": state.course, "at": state.at.data()}
-
-
-def _resumed(lines: list[dict[str, Any]]) -> _State | None:
-    """Return the state after the last line of a journal."""
-    if not lines:
-        return None
-    last = lines[-1]
-    cases = [Case(np.array(one["values"], dtype=float), one["seed"], one["name"]) for one in last["cases"]]
-    return _State(cases, last["searches"], Iterate.of_data(last["at"]), [tuple(each) for each in last["course"]])

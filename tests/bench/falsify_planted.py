@@ -24,8 +24,8 @@ import numpy as np
 import casadi_gnc as gnc
 from casadi_gnc.campaigns.plans import Independent
 from casadi_gnc.tuning.broken_case import break_of
+from casadi_gnc.tuning.builds import builds_of
 from casadi_gnc.tuning.descending import Effort
-from casadi_gnc.tuning.falsifying import _builds
 from casadi_gnc.tuning.flights import Flights, SpentError
 from casadi_gnc.tuning.journal import Journal
 from casadi_gnc.tuning.reach import Reach
@@ -148,7 +148,7 @@ def main() -> None:
             whole = gnc.falsify(file, "P", over=planted.over, out=folder / "b.toml")
             took = time.perf_counter() - began
             mission = gnc.load(folder / "whole.toml")
-            builds = _builds(mission, mission.schemes[0].name, "P", dict(planted.over))
+            builds = builds_of(mission, mission.schemes[0].name, "P", dict(planted.over))
             plain, refly = [Plain(build) for build in builds], []
             for seed in itertools.count():
                 if len(rows) == given.seeds:

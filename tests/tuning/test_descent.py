@@ -8,6 +8,7 @@ import pytest
 from casadi_gnc.errors import TuningError
 from casadi_gnc.tuning.descent import Iterate, Problem, begin, descend
 from casadi_gnc.tuning.iterates import Iterates
+from casadi_gnc.tuning.state import resumed
 
 
 def differences(costs):
@@ -112,6 +113,16 @@ def test_journal_goes_on_after_its_last_whole_line(tmp_path):
         Iterates(path, {"seed": 2, "values": [0.1, 1e-17]})
     again.close()
     assert not path.exists()
+
+
+def test_a_journal_of_other_bytes_is_told(tmp_path):
+    path = tmp_path / "tuned.toml.journal"
+    path.write_bytes(b"\xff\xfe\n\x80")
+    with pytest.raises(TuningError, match="is the journal of another tuning"):
+        Iterates(path, {"seed": 1})
+    for line in ({}, {"cases": [{}]}, [1], None):
+        with pytest.raises(TuningError, match="the last iterate of the journal cannot be read"):
+            resumed([line])
 
 
 @pytest.mark.parametrize("content", ["", '{"se'])

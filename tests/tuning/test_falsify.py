@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import casadi_gnc as gnc
 from casadi_gnc.cli.main import app
-from casadi_gnc.errors import CampaignError
+from casadi_gnc.errors import CampaignError, GncError
 from casadi_gnc.problem_files.document import read
 from casadi_gnc.problem_files.rewriting import dumped
 
@@ -44,11 +44,12 @@ def written(file, requirement=ASKED, **tables):
             {"over": {"timing.sample_period_s": [0.1] * 33}},
             "asks for 33 builds, expected at most 32",
         ),
+        ({"dispersion": [RATE]}, {"over": {"timing.sample_periods": [0.1, 0.2]}}, "sample_periods"),
     ],
 )
 def test_what_cannot_be_searched_is_one_sentence(tmp_path, tables, options, told):
     file = written(tmp_path / "m.toml", **tables)
-    with pytest.raises(CampaignError, match=r".") as raised:
+    with pytest.raises(GncError, match=r".") as raised:
         gnc.falsify(file, options.pop("requirement", "P"), **options)
     assert told in str(raised.value)
     assert "\n" not in str(raised.value)
