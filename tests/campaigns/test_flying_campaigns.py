@@ -435,7 +435,7 @@ def moment(out, process, shards, rng):
     if rng.random() < 0.2:
         time.sleep(rng.uniform(0.0, 2.0))
         return
-    asked = rng.randint(finished(out) + 1, shards)
+    asked = rng.randint(min(finished(out) + 1, shards), shards)
     while finished(out) < asked and process.poll() is None:
         time.sleep(0.002)
     time.sleep(rng.uniform(0.0, 0.02))
