@@ -19,7 +19,7 @@ from casadi_gnc.system import assets, compilers
 #: Flags with which gcc vectorises it; the words stay the same.
 FAST = ("-O3", "-fno-math-errno", "-fno-trapping-math")
 #: Largest sizes it is written for: actuators, rows of effort, rows of coupling, vertices.
-LARGEST = (32, 6, 8, 64)
+LARGEST = (64, 6, 8, 64)
 
 
 def sizes(problem: AllocationProblem) -> tuple[int, int, int, int]:

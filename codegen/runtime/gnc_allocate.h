@@ -24,7 +24,7 @@
  * Sizes and names are fixed by macros before the header is included, and the sources are compiled
  * with the same macros:
  *
- *     GNC_ALLOC_N       actuators, 1..32             GNC_ALLOC_R  rows of A0, 1..6
+ *     GNC_ALLOC_N       actuators, 1..64             GNC_ALLOC_R  rows of A0, 1..6
  *     GNC_ALLOC_P       rows of E, 0..8              GNC_ALLOC_V  vertices, 1..64
  *     GNC_ALLOC_REAL_FLOAT   defined: float, else double
  *     GNC_ALLOC_PREFIX  prefix of every symbol; two solvers in one program differ in it
@@ -88,9 +88,9 @@ enum gnc_alloc_saturation {
 #if !defined(GNC_ALLOC_N) || !defined(GNC_ALLOC_R) || !defined(GNC_ALLOC_P) || !defined(GNC_ALLOC_V)
 #error "define GNC_ALLOC_N, GNC_ALLOC_R, GNC_ALLOC_P and GNC_ALLOC_V before including gnc_allocate.h"
 #endif
-#if GNC_ALLOC_N < 1 || GNC_ALLOC_N > 32 || GNC_ALLOC_R < 1 || GNC_ALLOC_R > 6 || GNC_ALLOC_P < 0 || \
+#if GNC_ALLOC_N < 1 || GNC_ALLOC_N > 64 || GNC_ALLOC_R < 1 || GNC_ALLOC_R > 6 || GNC_ALLOC_P < 0 || \
     GNC_ALLOC_P > 8 || GNC_ALLOC_V < 1 || GNC_ALLOC_V > 64
-#error "sizes out of range: N 1..32, R 1..6, P 0..8, V 1..64"
+#error "sizes out of range: N 1..64, R 1..6, P 0..8, V 1..64"
 #endif
 #if GNC_ALLOC_P == 0 && GNC_ALLOC_V != 1
 #error "P = 0 means no uncertainty: V must be 1"

@@ -11,7 +11,7 @@ import pytest
 from online_allocator import COLD, INTERIOR_POINT, WARM, Allocator
 
 STRICT = ["-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror"]
-SIZES = [(12, 3, 3, 8), (12, 3, 0, 1), (4, 3, 3, 8), (4, 3, 1, 2), (24, 6, 8, 64), (1, 1, 0, 1), (32, 6, 0, 1)]
+SIZES = [(12, 3, 3, 8), (12, 3, 0, 1), (4, 3, 3, 8), (4, 3, 1, 2), (24, 6, 8, 64), (1, 1, 0, 1), (64, 6, 0, 1)]
 SHAPES = [(4, 3), (6, 3), (8, 3), (12, 3), (16, 6), (24, 3), (24, 6)]
 PLAIN = (oa.A0_2020, oa.E_2020, oa.centre_of_mass_vertices([5e-3] * 3), 1, 1, 1e6)
 
@@ -420,6 +420,19 @@ def test_many_vertices_and_six_rows():
     for mode in (COLD, WARM, INTERIOR_POINT):
         _, results = allocator.sequence(u, previous, 0, oa.MAX_FORCE, mode=mode)
         check(problem, u, previous, np.zeros(N), np.full(N, oa.MAX_FORCE), None, results)
+
+
+@pytest.mark.slow
+def test_sixty_four_actuators():
+    """The largest size, all families: 64 actuators, 6 rows, 8 vertices."""
+    rng, allocator = np.random.default_rng(5), Allocator(64, 6, 3, 8)
+    for family in oa.FAMILIES:
+        for _ in range(3):
+            problem, u, previous, lower, upper, step = oa.instance(rng, family, 64, 6)
+            assert allocator.setup(*problem) == oa.OPTIMAL
+            for mode in (COLD, WARM, INTERIOR_POINT):
+                _, results = allocator.sequence(u, previous, lower, upper, step, mode=mode)
+                check(problem, u, previous, lower, upper, step, results)
 
 
 @pytest.mark.parametrize("family", [f for f in oa.FAMILIES if f != "mixed_zero"])

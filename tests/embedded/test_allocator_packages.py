@@ -176,11 +176,18 @@ def test_words_are_the_same_on_targets(tmp_path):
         assert (targets.measure(tmp_path / real, "eight", boards.find("ppc64")).outputs == expected).all()
 
 
+PROPELLANT = '[options]\nobjective = "propellant"\npriorities = [0, 1, 1]\n'
+LIMIT = '[[limit]]\nname = "bus"\ncoefficients = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\nmost = 3.0\n'
+
+
 @pytest.mark.parametrize(
     ("options", "given", "sentence"),
     [
         ("[options]\nkeep_direction = true\n", {}, "eight: keep_direction is solved by linear programs"),
         ("[options]\nleast_force_N = 0.1\n", {}, "eight: least_force_N is solved by a search"),
+        (PROPELLANT, {}, 'eight: objective = "propellant" is solved by linear programs'),
+        (PROPELLANT + LIMIT, {}, 'eight: objective = "propellant" is solved by linear programs'),
+        (LIMIT, {}, "limit"),
         ("", {"rate": 10.0}, "rate is not for an allocation file"),
         ("", {"commands": "short.csv"}, "short.csv, line 1: column u3 is missing"),
         ("", {"name": "int"}, "'int' is a keyword"),
