@@ -11,8 +11,8 @@ import numpy as np
 
 #: Largest share that is looked for.
 _MOST = 1e6
-#: Where a program counts as unsolved, for numbers hundreds of decades apart may never end: by iterations, so that what is
-#: found is the same on a busy machine, and by seconds where not even one ends.
+#: Where a program counts as unsolved, for numbers hundreds of decades apart may never end: by iterations, so that what
+#: is found is the same on a busy machine, and by seconds where not even one ends.
 PATIENCE = {"maxiter": 50_000, "time_limit": 15.0}
 UNSOLVED = 1
 
