@@ -50,6 +50,10 @@ def tune(
     conditions: Annotated[
         ConditionsChoice, typer.Option(help="Of the law's theorems: those that hold before must hold after, or all.")
     ] = ConditionsChoice.held,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=LEAST of the linear loop: disk, decay_1_s or damping; may be repeated."),
+    ] = None,
     digits: Annotated[int, typer.Option(min=1, max=17, help="Of the gains that are written.")] = 3,
     iterations: Annotated[int, typer.Option(min=1, help="At most so many.")] = 20,
     cases: Annotated[int, typer.Option(min=1, help="Of a campaign.")] = 64,
@@ -72,6 +76,7 @@ def tune(
         against=against.value,
         cost=cost,
         conditions=conditions.value,
+        keep=_least(keep or []),
         digits=digits,
         iterations=iterations,
         cases=cases,
@@ -93,6 +98,20 @@ def tune(
         typer.echo("\n".join(f"wrote {path}" for path in (out, report) if path is not None))
     if not found.cost_after < found.cost_before:
         raise typer.Exit(1)
+
+
+def _least(told: list[str]) -> dict[str, float]:
+    """Return the bounds that are told as NAME=LEAST; raise `TuningError` for what is not."""
+    from casadi_gnc.errors import TuningError
+
+    found = {}
+    for each in told:
+        name, _, least = each.partition("=")
+        try:
+            found[name.strip()] = float(least)
+        except ValueError:
+            raise TuningError(f"--keep is {each!r}; expected NAME=LEAST, such as disk=0.5") from None
+    return found
 
 
 def _print(found: Tuned) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +19,7 @@ from casadi_gnc.tuning.descent import Iterate, Problem, begin, descend
 from casadi_gnc.tuning.gain_flights import Case, Flights, planned
 from casadi_gnc.tuning.gains import Gains, gains_free
 from casadi_gnc.tuning.iterates import Iterates
+from casadi_gnc.tuning.loop_bounds import LoopBounds
 from casadi_gnc.tuning.outcome import Tuned, outcome
 from casadi_gnc.tuning.state import State, resumed
 from casadi_gnc.tuning.writing import refuse_target, write
@@ -38,6 +39,7 @@ def tune(
     against: Against = "nominal",
     cost: str | None = None,
     conditions: Literal["held", "all"] = "held",
+    keep: Mapping[str, float] | None = None,
     digits: int = 3,
     iterations: int = 20,
     cases: int = 64,
@@ -60,6 +62,7 @@ def tune(
     cost : what is made small, see `casadi_gnc.tuning.costs`; by default the integrals of what the craft regulates,
         rates only where there is nothing else, and a tenth of that of the effort.
     conditions : of the law's theorems: those that hold before must hold after ("held"), or "all" must.
+    keep : of the linear loop, from below: "disk", "decay_1_s", "damping" (`casadi_gnc.tuning.loop_bounds`).
     digits : of the gains that are returned.
     iterations : at most so many, in all.
     cases, plan : of "campaign": how many, and how they fill the space, as for `casadi_gnc.campaign`.
@@ -71,7 +74,8 @@ def tune(
     Raises
     ------
     TuningError
-        For gains that are not the law's, a cost that is flat or has no value, constraints that cannot hold together, no
+        For gains that are not the law's, a cost that is flat or has no value, constraints that cannot hold together or
+        bounds of the loop that do not hold at first, no
         dispersion where one is needed, and a result that does not fly as it was promised.
 
     Examples
@@ -89,7 +93,8 @@ def tune(
     target = refuse_target(mission, out)
     wanted, measured = cost_of(cost, mission, chosen)
     kept = conditions_of(mission, chosen, gains, every=conditions == "all")
-    before = verdicts_of(mission, chosen)
+    bounds, before = LoopBounds(dict(keep or {})), verdicts_of(mission, chosen)
+    bounds.refuse(mission, chosen)
     dispersions = [] if against == "nominal" else list(mission.dispersions)
     flights = Flights(measured, chosen, gains, dispersions, wanted, threads)
     start = np.array([one.value for one in gains.each])
@@ -99,12 +104,12 @@ def tune(
         {
             "mission": mission.digest, "scheme": chosen, "gains": [[g.key, g.value, g.low, g.high] for g in gains.each],
             "against": against, "cost": wanted.text, "conditions": conditions, "cases": cases,
-            "plan": plan, "seed": seed,
+            "plan": plan, "seed": seed, "keep": dict(bounds.least),
         },
     )  # fmt: skip
 
     def allowed(z: np.ndarray) -> bool:
-        return not _troubles(flights, gains.values(z)[0], chosen, before)
+        return not _troubles(flights, gains.values(z)[0], chosen, before, bounds)
 
     def problem_of(own: list[Case]) -> Problem:
         return Problem(
@@ -155,7 +160,7 @@ def tune(
         if state.at.number >= iterations:
             break
     values = _rounded(problem_of(state.cases), flights, state, kept.margins, digits, lambda v: not _troubles(
-        flights, v, chosen, before))  # fmt: skip
+        flights, v, chosen, before, bounds))  # fmt: skip
     found = outcome(mission, chosen, flights, state.cases, values, against, state.course, before)
     if target is not None:
         found = write(found, flights, mission, target)
@@ -187,14 +192,16 @@ def _refuse_options(mission: Mission, against: str, conditions: str, digits: int
         )
 
 
-def _troubles(flights: Flights, values: np.ndarray, scheme: str, before: dict[str, Any]) -> list[str]:
-    """Return which checks fail or warn with these gains and did not before."""
+def _troubles(
+    flights: Flights, values: np.ndarray, scheme: str, before: dict[str, Any], bounds: LoopBounds
+) -> list[str]:
+    """Return which checks fail or warn with these gains and did not before, and what the loop has too little of."""
     row = np.concatenate([values, flights.nominal.values])
     try:
         mission = flights.objective.cases.varied.at(row)
     except GncError as error:
         return [str(error)]
-    return new_troubles(before, verdicts_of(mission, scheme))
+    return bounds.short(mission, scheme) or new_troubles(before, verdicts_of(mission, scheme))
 
 
 def _refuse_flat(problem: Problem, at: Iterate, gains: Gains) -> None:

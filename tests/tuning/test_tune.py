@@ -147,6 +147,19 @@ def test_the_worst_case_is_that_which_follows_by_hand(tmp_path):
     assert found.gains[0].after == 4.0
 
 
+def test_poles_that_are_to_be_kept_are(mission):
+    """The smallest integral over 40 s oscillates; with a bound on the damping of J s^2 + k s + a/4 it does not."""
+    options = {"cost": "integral(mrp)", "iterations": 4, "threads": 1}
+    damping = []
+    for keep in (None, {"damping": 0.9}):
+        found = gnc.tune(mission, ["attitude_gain", "rate_gain"], keep=keep, **options)
+        stiffness, rate = (one.after for one in found.gains)
+        damping.append(0.5 * rate / np.sqrt(110.0 * stiffness / 4.0))
+        assert found.ratio > 1
+    assert damping[0] < 0.85
+    assert damping[1] > 0.89
+
+
 def test_a_killed_run_goes_on_and_comes_to_the_same(mission):
     class KilledError(Exception):
         pass

@@ -14,6 +14,7 @@ from casadi_gnc.laws.mrp_feedback import MrpFeedback
 from casadi_gnc.tuning.conditions import conditions_of, new_troubles
 from casadi_gnc.tuning.costs import cost_of, from_record
 from casadi_gnc.tuning.gains import gains_free
+from casadi_gnc.tuning.loop_bounds import LoopBounds
 
 
 @pytest.fixture(scope="module")
@@ -142,12 +143,27 @@ def test_conditions_that_cannot_hold_together_are_named(funnel):
         conditions_of(funnel, "funnel_pinv", gains, every=True)
 
 
+def test_poles_of_a_turn_are_those_of_its_quadratic(slew):
+    """About each axis J s^2 + 18 s + 4/4, an MRP being a quarter of the angle; samples of 0.1 s delay a little."""
+    poles = np.concatenate([np.roots([moment, 18.0, 1.0]) for moment in (85.0, 110.0, 64.0)])
+    right = {"decay_1_s": -poles.real.max(), "damping": (-poles.real / np.abs(poles)).min()}
+    for name, value in right.items():
+        assert not LoopBounds({name: 0.99 * value}).short(slew, "pd")
+        (told,) = LoopBounds({name: 1.01 * value}).short(slew, "pd")
+        assert told.startswith(f"{name} 0.")
+    disk = gnc.margins(slew, "pd")[0].disk_of_efforts
+    assert not LoopBounds({"disk": disk}).short(slew, "pd")
+    assert LoopBounds({"disk": 1.001 * disk}).short(slew, "pd")
+
+
 def test_options_are_told(slew):
     each: tuple[tuple[dict[str, Any], str], ...] = (
         ({"against": "worst"}, r"satellites/slew has no \[\[dispersion\]\]|slew has no \[\[dispersion\]\]"),
         ({"against": "campaign"}, r"has neither a \[\[dispersion\]\] nor noise"),
         ({"against": "luck"}, "against is 'luck', expected nominal, worst or campaign"),
         ({"digits": 0}, "digits is 0, expected 1 to 17"),
+        ({"keep": {"decay": 1.0}}, "a loop has no 'decay' to keep; there is disk, decay_1_s, damping"),
+        ({"keep": {"damping": 0.9}}, "the loop of the first gains does not keep what is asked: damping 0.85"),
         ({"conditions": "some"}, "conditions is 'some', expected held or all"),
     )
     for options, told in each:
