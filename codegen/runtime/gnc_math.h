@@ -4,14 +4,14 @@
  *
  * libm differs between machines in the last bits, and most of it cannot be vectorised. The functions
  * here use only + - * / sqrt, comparisons and integer operations on the bit pattern, which IEEE 754
- * rounds in one way only. Every choice is a select, never a jump or a loop, so that a compiler can turn
- * a loop over lanes into vector code. This file holds the double versions (gnc_exp), gnc_mathf.h the
+ * rounds in one way only. Nothing loops, and every choice is between two values without side effects, so that a compiler
+ * can turn a loop over lanes into vector code. This file holds the double versions (gnc_exp), gnc_mathf.h the
  * float versions (gnc_expf), which never touch double.
  *
  * Build with -std=c99 -ffp-contract=off, rounding to nearest, subnormal numbers on, and link with -lm for sqrt.
  * gcc vectorises only with -fno-math-errno -fno-trapping-math -fopenmp-simd as well, which leave the bits alone:
  * all functions for AVX2 and wider, most for SSE2. Define GNC_INLINE as
- * `static inline __attribute__((always_inline))` where lanes matter more than code size.
+ * `static inline __attribute__((always_inline))`, and GNC_LANES as 1, where lanes matter more than code size.
  *
  * "max u ulp" beside a function is the largest error found, in units in the last place of the exact result, rounded
  * up: here over at least eight million arguments in the range stated (random ones, and ones close to the places where
@@ -381,23 +381,31 @@ GNC_INLINE double gnc_tanh(double x) {
 /* ---- Error function -------------------------------------------------------------------------------- */
 
 /* Below 1, x + x P(x^2); from there on 1 - e^(-x^2) Q((|x| - 3)/(|x| + 3)), as what is taken off is small. P and Q are
- * minimax polynomials, made with 60 digits. All x; max 1.45 ulp. */
-GNC_INLINE double gnc_erf(double x) {
-    const double a = gnc_fabs(x);
-    const double s = a < 1.0 ? a * a : 1.0, s3 = s * s * s;
+ * minimax polynomials, made with 60 digits. */
+GNC_INLINE double gnc_erf_near_(double x) {
+    const double s = x * x, s3 = s * s * s;
     const double p_low = gnc_poly3_(s, 0.12837916709551256, -0.37612638903183393, 0.11283791670939276) +
                          s3 * gnc_poly3_(s, -0.026866170642337487, 0.0052239775997986182, -0.00085483256279412611);
     const double p_high = gnc_poly3_(s, 0.00012055284633541632, -1.4924542340417247e-05, 1.6445063106371516e-06) +
                           s3 * gnc_poly3_(s, -1.6190730651579864e-07, 1.3644831708592282e-08, -7.6585436879790383e-10);
-    const double near = x + x * (p_low + (s3 * s3) * p_high);
+    return x + x * (p_low + (s3 * s3) * p_high);
+}
+
+/* For 1 <= |x|. */
+GNC_INLINE double gnc_erf_far_(double x) {
+    const double a = gnc_fabs(x);
     const double b = a < 6.0 ? a : 6.0;
     const double t = (b - 3.0) / (b + 3.0), t3 = t * t * t;
     const double q_low = gnc_poly3_(t, 0.17900115118135387, -0.32623356004589982, 0.24560380166428189) +
                          t3 * gnc_poly3_(t, -0.15011593634472473, 0.071665850116798019, -0.024392327975932996);
     const double q_high = gnc_poly3_(t, 0.0042703533585785932, 0.00071317400150438192, -0.00058109463945536051) +
                           t3 * gnc_poly3_(t, 7.6391097370486397e-05, 0.00010294982681996221, 1.5202692020050951e-05);
-    const double far = gnc_copysign(1.0 - gnc_exp(-(b * b)) * (q_low + (t3 * t3) * q_high), x);
-    const double y = a < 1.0 ? near : far;
+    return gnc_copysign(1.0 - gnc_exp(-(b * b)) * (q_low + (t3 * t3) * q_high), x);
+}
+
+/* All x; max 1.45 ulp. */
+GNC_INLINE double gnc_erf(double x) {
+    const double y = gnc_fabs(x) < 1.0 ? gnc_erf_near_(x) : gnc_erf_far_(x);
     return x == x ? y : gnc_nan_();
 }
 
@@ -536,7 +544,7 @@ typedef struct {
  * For a >= 0. pi/2 comes in parts of 33, 33, 33 and 53 bits: for a count n below 2^20 the first three products
  * with n are exact, and the sums keep their errors, so r is good even where a is next to a multiple of pi/2.
  */
-GNC_INLINE gnc_trig_parts_ gnc_trig_reduce_(double a) {
+GNC_INLINE gnc_trig_parts_ gnc_trig_reduce_far_(double a) {
     const double x = a <= 0x1p30 ? a : 0.0;
     const double shifted = x * 0x1.45f306dc9c883p-1 + GNC_ROUNDER_;
     const double n = shifted - GNC_ROUNDER_;
@@ -546,6 +554,15 @@ GNC_INLINE gnc_trig_parts_ gnc_trig_reduce_(double a) {
     gnc_trig_parts_ p;
     p.r = gnc_sum_sorted_(r3.hi, (r2.lo + r3.lo) - n * 0x1.b839a252049c1p-104);
     p.quarter = gnc_bits_(shifted);
+    return p;
+}
+
+/* For a >= 0. Below pi/4 nothing is taken off, and the steps above would give a itself. */
+GNC_INLINE gnc_trig_parts_ gnc_trig_reduce_(double a) {
+    gnc_trig_parts_ p = {{a, 0.0}, 0u};
+    if ((GNC_LANES != 0) || !(a <= 0.785)) {
+        p = gnc_trig_reduce_far_(a);
+    }
     return p;
 }
 
@@ -633,27 +650,38 @@ GNC_INLINE gnc_pair_ gnc_asin_root_(double a) {
     return s;
 }
 
-/* |x| <= 1/2 directly, else pi/2 - 2 asin(sqrt((1 - |x|)/2)). |x| <= 1; max 0.67 ulp. */
-GNC_INLINE double gnc_asin(double x) {
-    const double a = gnc_fabs(x);
+/* pi/2 - 2 asin(sqrt((1 - a)/2)) for 1/2 <= a <= 1. */
+GNC_INLINE double gnc_asin_far_(double a) {
     const gnc_pair_ root = gnc_asin_root_(a);
     const gnc_pair_ far = gnc_sum_sorted_(0x1.921fb54442d18p+0, -2.0 * root.hi);
-    const double y_far = far.hi + (far.lo + (0x1.1a62633145c07p-54 - 2.0 * root.lo));
-    const double y_near = a + gnc_asin_rest_(a, a * a);
-    const double y = gnc_copysign(a <= 0.5 ? y_near : y_far, x);
+    return far.hi + (far.lo + (0x1.1a62633145c07p-54 - 2.0 * root.lo));
+}
+
+/* |x| <= 1/2 directly. |x| <= 1; max 0.67 ulp. */
+GNC_INLINE double gnc_asin(double x) {
+    const double a = gnc_fabs(x);
+    const double y = gnc_copysign(a <= 0.5 ? a + gnc_asin_rest_(a, a * a) : gnc_asin_far_(a), x);
     return a <= 1.0 ? y : gnc_nan_();
 }
 
-/* pi/2 - asin x, or 2 asin(sqrt((1 - x)/2)) close to 1. |x| <= 1; max 0.63 ulp. */
+/* pi/2 - asin x for |x| <= 1/2. */
+GNC_INLINE double gnc_acos_near_(double x) {
+    const gnc_pair_ near = gnc_sum_sorted_(0x1.921fb54442d18p+0, -x);
+    return near.hi + (near.lo + (0x1.1a62633145c07p-54 - gnc_asin_rest_(x, x * x)));
+}
+
+/* 2 asin(sqrt((1 - x)/2)) close to 1, pi minus that of -x close to -1. */
+GNC_INLINE double gnc_acos_far_(double x) {
+    const gnc_pair_ root = gnc_asin_root_(gnc_fabs(x));
+    const gnc_pair_ near_minus_1 = gnc_sum_sorted_(0x1.921fb54442d18p+1, -2.0 * root.hi);
+    const double y_minus_1 = near_minus_1.hi + (near_minus_1.lo + (0x1.1a62633145c07p-53 - 2.0 * root.lo));
+    return x < 0.0 ? y_minus_1 : 2.0 * (root.hi + root.lo);
+}
+
+/* |x| <= 1; max 0.63 ulp. */
 GNC_INLINE double gnc_acos(double x) {
     const double a = gnc_fabs(x);
-    const gnc_pair_ root = gnc_asin_root_(a);
-    const gnc_pair_ near_zero = gnc_sum_sorted_(0x1.921fb54442d18p+0, -x);
-    const gnc_pair_ near_minus_1 = gnc_sum_sorted_(0x1.921fb54442d18p+1, -2.0 * root.hi);
-    const double y_zero = near_zero.hi + (near_zero.lo + (0x1.1a62633145c07p-54 - gnc_asin_rest_(x, x * x)));
-    const double y_minus_1 = near_minus_1.hi + (near_minus_1.lo + (0x1.1a62633145c07p-53 - 2.0 * root.lo));
-    const double y_far = x < 0.0 ? y_minus_1 : 2.0 * (root.hi + root.lo);
-    const double y = a <= 0.5 ? y_zero : y_far;
+    const double y = a <= 0.5 ? gnc_acos_near_(x) : gnc_acos_far_(x);
     return a <= 1.0 ? y : gnc_nan_();
 }
 

@@ -15,6 +15,11 @@
 
 #include "gnc_arithmetic.h"
 
+/* 1 where loops over lanes shall become vector code, which computes both sides of a choice; where it is 0, a jump skips
+ * what a small argument does not need. The bits are the same. */
+#ifndef GNC_LANES
+#define GNC_LANES 0
+#endif
 #ifndef GNC_INLINE
 #define GNC_INLINE static inline
 #endif
@@ -321,19 +326,27 @@ GNC_INLINE float gnc_tanhf(float x) {
 
 /* ---- Error function -------------------------------------------------------------------------------- */
 
-/* Q of (|x| - 2)/(|x| + 2) here. All x; max 1.40 ulp. */
-GNC_INLINE float gnc_erff(float x) {
-    const float a = gnc_fabsf(x);
-    const float s = a < 1.0f ? a * a : 1.0f, s3 = s * s * s;
+/* For |x| < 1. */
+GNC_INLINE float gnc_erf_nearf_(float x) {
+    const float s = x * x, s3 = s * s * s;
     const float p_high = gnc_poly3f_(s, -0.026855126f, 0.00519073382f, -0.000803076313f) + s3 * 7.92038627e-05f;
     const float p = gnc_poly3f_(s, 0.128379166f, -0.376126289f, 0.112836182f) + s3 * p_high;
-    const float near = x + x * p;
+    return x + x * p;
+}
+
+/* For 1 <= |x|; Q of (|x| - 2)/(|x| + 2) here. */
+GNC_INLINE float gnc_erf_farf_(float x) {
+    const float a = gnc_fabsf(x);
     const float b = a < 4.0f ? a : 4.0f;
     const float t = (b - 2.0f) / (b + 2.0f);
     const float q_high = gnc_poly3f_(t, -0.0789869055f, 0.00372974039f, 0.00721255178f);
     const float q = gnc_poly3f_(t, 0.255395681f, -0.427185863f, 0.241657272f) + (t * t * t) * q_high;
-    const float far = gnc_copysignf(1.0f - gnc_expf(-(b * b)) * q, x);
-    const float y = a < 1.0f ? near : far;
+    return gnc_copysignf(1.0f - gnc_expf(-(b * b)) * q, x);
+}
+
+/* All x; max 1.40 ulp. */
+GNC_INLINE float gnc_erff(float x) {
+    const float y = gnc_fabsf(x) < 1.0f ? gnc_erf_nearf_(x) : gnc_erf_farf_(x);
     return x == x ? y : gnc_nanf_();
 }
 
@@ -467,7 +480,7 @@ typedef struct {
  * products with n are exact. So are the first two differences, and the sums keep their errors, so r is good even
  * where a is next to a multiple of pi/2.
  */
-GNC_INLINE gnc_trig_partsf_ gnc_trig_reducef_(float a) {
+GNC_INLINE gnc_trig_partsf_ gnc_trig_reduce_farf_(float a) {
     const float x = a <= 0x1p17f ? a : 0.0f;
     const float shifted = x * 0x1.45f306p-1f + GNC_ROUNDERF_;
     const float n = shifted - GNC_ROUNDERF_;
@@ -477,6 +490,15 @@ GNC_INLINE gnc_trig_partsf_ gnc_trig_reducef_(float a) {
     gnc_trig_partsf_ p;
     p.r = gnc_sum_sortedf_(r4.hi, (r3.lo + r4.lo) - n * 0x1.1a6264p-54f);
     p.quarter = gnc_bitsf_(shifted);
+    return p;
+}
+
+/* For a >= 0. Below pi/4 nothing is taken off, and the steps above would give a itself. */
+GNC_INLINE gnc_trig_partsf_ gnc_trig_reducef_(float a) {
+    gnc_trig_partsf_ p = {{a, 0.0f}, 0u};
+    if ((GNC_LANES != 0) || !(a <= 0.785f)) {
+        p = gnc_trig_reduce_farf_(a);
+    }
     return p;
 }
 
@@ -560,27 +582,38 @@ GNC_INLINE gnc_pairf_ gnc_asin_rootf_(float a) {
     return s;
 }
 
-/* |x| <= 1/2 directly, else pi/2 - 2 asin(sqrt((1 - |x|)/2)). |x| <= 1; max 0.66 ulp. */
-GNC_INLINE float gnc_asinf(float x) {
-    const float a = gnc_fabsf(x);
+/* pi/2 - 2 asin(sqrt((1 - a)/2)) for 1/2 <= a <= 1. */
+GNC_INLINE float gnc_asin_farf_(float a) {
     const gnc_pairf_ root = gnc_asin_rootf_(a);
     const gnc_pairf_ far = gnc_sum_sortedf_(0x1.921fb6p+0f, -2.0f * root.hi);
-    const float y_far = far.hi + (far.lo + (-0x1.777a5cp-25f - 2.0f * root.lo));
-    const float y_near = a + gnc_asin_restf_(a, a * a);
-    const float y = gnc_copysignf(a <= 0.5f ? y_near : y_far, x);
+    return far.hi + (far.lo + (-0x1.777a5cp-25f - 2.0f * root.lo));
+}
+
+/* |x| <= 1/2 directly. |x| <= 1; max 0.66 ulp. */
+GNC_INLINE float gnc_asinf(float x) {
+    const float a = gnc_fabsf(x);
+    const float y = gnc_copysignf(a <= 0.5f ? a + gnc_asin_restf_(a, a * a) : gnc_asin_farf_(a), x);
     return a <= 1.0f ? y : gnc_nanf_();
 }
 
-/* pi/2 - asin x, or 2 asin(sqrt((1 - x)/2)) close to 1. |x| <= 1; max 0.65 ulp. */
+/* pi/2 - asin x for |x| <= 1/2. */
+GNC_INLINE float gnc_acos_nearf_(float x) {
+    const gnc_pairf_ near = gnc_sum_sortedf_(0x1.921fb6p+0f, -x);
+    return near.hi + (near.lo + (-0x1.777a5cp-25f - gnc_asin_restf_(x, x * x)));
+}
+
+/* 2 asin(sqrt((1 - x)/2)) close to 1, pi minus that of -x close to -1. */
+GNC_INLINE float gnc_acos_farf_(float x) {
+    const gnc_pairf_ root = gnc_asin_rootf_(gnc_fabsf(x));
+    const gnc_pairf_ near_minus_1 = gnc_sum_sortedf_(0x1.921fb6p+1f, -2.0f * root.hi);
+    const float y_minus_1 = near_minus_1.hi + (near_minus_1.lo + (-0x1.777a5cp-24f - 2.0f * root.lo));
+    return x < 0.0f ? y_minus_1 : 2.0f * (root.hi + root.lo);
+}
+
+/* |x| <= 1; max 0.65 ulp. */
 GNC_INLINE float gnc_acosf(float x) {
     const float a = gnc_fabsf(x);
-    const gnc_pairf_ root = gnc_asin_rootf_(a);
-    const gnc_pairf_ near_zero = gnc_sum_sortedf_(0x1.921fb6p+0f, -x);
-    const gnc_pairf_ near_minus_1 = gnc_sum_sortedf_(0x1.921fb6p+1f, -2.0f * root.hi);
-    const float y_zero = near_zero.hi + (near_zero.lo + (-0x1.777a5cp-25f - gnc_asin_restf_(x, x * x)));
-    const float y_minus_1 = near_minus_1.hi + (near_minus_1.lo + (-0x1.777a5cp-24f - 2.0f * root.lo));
-    const float y_far = x < 0.0f ? y_minus_1 : 2.0f * (root.hi + root.lo);
-    const float y = a <= 0.5f ? y_zero : y_far;
+    const float y = a <= 0.5f ? gnc_acos_nearf_(x) : gnc_acos_farf_(x);
     return a <= 1.0f ? y : gnc_nanf_();
 }
 

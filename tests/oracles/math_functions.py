@@ -38,6 +38,7 @@ LANES = [
     "-fno-trapping-math",
     "-fopenmp-simd",
     "-DLANES",
+    "-DGNC_LANES=1",
     "-DGNC_INLINE=static inline __attribute__((always_inline))",
 ]
 
