@@ -10,6 +10,7 @@ import casadi as ca
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.embedded.monitor import Monitor
+from casadi_gnc.embedded.named_nodes import Mark
 from casadi_gnc.embedded.names import check_name, check_package, check_parameter
 from casadi_gnc.embedded.scalars import Math, Real, c_constant
 from casadi_gnc.errors import PackageError
@@ -110,6 +111,8 @@ class Controller:
     monitor : what the package watches on board, or None.
     faults : what the package does with faults beside telling them, or None.
     notes : tape -> result -> what its elements are, for those who read the C: how many, what.
+    marks : tape -> what its law names on the way to them: title, scalars of the tape
+        (`casadi_gnc.embedded.named_nodes`).
     """
 
     title: str
@@ -134,6 +137,7 @@ class Controller:
     faults: Faults | None = None
     carry: int = 0
     notes: dict[str, dict[str, tuple[tuple[int, str], ...]]] = field(default_factory=dict)
+    marks: dict[str, tuple[Mark, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for layout in (self.measured, self.memory, self.outputs):

@@ -17,8 +17,12 @@ from typing import Literal
 
 import casadi as ca
 
+from casadi_gnc.embedded.named_nodes import Mark
 from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Math, Node, Real, c_constant, expression, graph, uses
 from casadi_gnc.errors import PrinterError
+
+#: Operations from which on a quantity on the way is a block of its own.
+LEAST = 4
 
 
 def print_function(
@@ -31,6 +35,7 @@ def print_function(
     flag: str = "_Bool",
     shared: Sequence[str] | None = None,
     titles: Mapping[str, str] | None = None,
+    marks: Sequence[Mark] = (),
 ) -> str:
     """Return the C text of a `static` function with the name of `function`.
 
@@ -46,6 +51,7 @@ def print_function(
     shared : print the function for LANES columns side by side, element i of lane l at `name[i * LANES + l]`, but of
         these ports one column for all.
     titles : for places of results what they are: the operations that each is the first to need follow it as a comment.
+    marks : of scalars on the way there what they are, in the order in which they are made.
 
     Raises
     ------
@@ -65,13 +71,13 @@ def print_function(
     nodes, results = graph(function, places)
     zero, one = c_constant(0.0, real), c_constant(1.0, real)
     used, compared = uses(nodes, [node for _, node in results])
-    blocks = blocks_of(nodes, results, titles or {})
-    body, block, told = [], "", set()
+    blocks = blocks_of(nodes, results, titles or {}, marks)
+    headings, told = _headings([k for k in range(len(nodes)) if k in used], blocks), set()
+    body = []
     for k, node in enumerate(nodes):
         if k not in used:
             continue
-        if blocks.get(k, block) != block:
-            block = blocks[k]
+        if block := headings.get(k):
             body += [f"    {line}" for line in comment(block, again=block in told)]
             told.add(block)
         if node.code == ca.OP_CONST:
@@ -109,16 +115,41 @@ def print_function(
     return "\n".join([head, loop[0], *unused, *loop[1:], *inner, "    }", "}", ""])
 
 
-def blocks_of(nodes: Sequence[Node], results: Sequence[tuple[str, int]], titles: Mapping[str, str]) -> dict[int, str]:
-    """Return for each scalar the title of the first result that needs it."""
+def blocks_of(
+    nodes: Sequence[Node], results: Sequence[tuple[str, int]], titles: Mapping[str, str], marks: Sequence[Mark] = ()
+) -> dict[int, str]:
+    """Return for each scalar the title of the first that needs it, of the marks, then of the results.
+
+    A mark of which less than `LEAST` operations are left is no block of its own.
+    """
     found: dict[int, str] = {}
-    for place, node in results:
-        todo = [node] if place in titles else []
+    told = [(titles[place], (node,)) for place, node in results if place in titles]
+    for i, (title, wanted) in enumerate([*marks, *told]):
+        own, todo = set[int](), list(wanted)
         while todo:
             k = todo.pop()
-            if k not in found:
-                found[k] = titles[place]
+            if k not in found and k not in own:
+                own.add(k)
                 todo += nodes[k].operands
+        if i >= len(marks) or sum(1 for k in own if nodes[k].operands) >= LEAST:
+            found.update(dict.fromkeys(own, title))
+    return found
+
+
+def _headings(order: Sequence[int], blocks: Mapping[int, str]) -> dict[int, str]:
+    """Return the title before each scalar that begins a block; less than `LEAST` of a block told before begin none."""
+    runs: list[tuple[str, list[int]]] = []
+    for k in order:
+        title = blocks.get(k, runs[-1][0] if runs else "")
+        if not runs or runs[-1][0] != title:
+            runs.append((title, []))
+        runs[-1][1].append(k)
+    found: dict[int, str] = {}
+    block, told = "", {""}
+    for title, run in runs:
+        if title != block and (title not in told or len(run) >= LEAST):
+            found[run[0]] = block = title
+            told.add(title)
     return found
 
 

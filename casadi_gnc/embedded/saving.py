@@ -36,7 +36,7 @@ def to_text(controller: Controller) -> str:
     content["tapes"] = {name: tape.serialize() for name, tape in controller.tapes.items()}
     content["statuses"] = [[bit, name, sentence] for bit, (name, sentence) in controller.statuses.items()]
     content["tunables"] = [asdict(one) for one in controller.tunables]
-    content["notes"] = controller.notes
+    content["notes"], content["marks"] = controller.notes, controller.marks
     if controller.monitor is not None:
         own = controller.monitor
         kept = {"watched": [asdict(one) for one in own.watched], "tape": own.tape.serialize(), "horizon": own.horizon}
@@ -63,6 +63,10 @@ def from_text(text: str) -> Controller:
         given["notes"] = {
             tape: {port: tuple((int(n), str(what)) for n, what in blocks) for port, blocks in ports.items()}
             for tape, ports in content.get("notes", {}).items()
+        }
+        given["marks"] = {
+            tape: tuple((str(title), tuple(int(k) for k in nodes)) for title, nodes in marks)
+            for tape, marks in content.get("marks", {}).items()
         }
         given["monitor"] = _monitor_of(content["monitor"]) if "monitor" in content else None
         given["faults"] = _faults_of(content["faults"]) if "faults" in content else None

@@ -232,6 +232,11 @@ def _print(name: str, controller: Controller, options: Options) -> tuple[str, st
         for i in range(count)
         if first + i < len(places[port])
     }
+    if name == "before":
+        arguments["titles"] |= dict.fromkeys(
+            places["carried"], "carried: what the steps after the allocation take over"
+        )
+    arguments["marks"] = [(c_comment(title), nodes) for title, nodes in controller.marks.get(name, ())]
     draft = print_function(tape, arguments=[], **arguments)
     touched = [thing for thing in _OBJECTS if re.search(rf"\b{thing}->", draft)]
     declared = [_OBJECTS[thing].format(name=options.name) for thing in touched]

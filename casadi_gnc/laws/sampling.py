@@ -41,7 +41,12 @@ def advance(law: Law, t: Any, y: Any, m: Any, wanted: Any, achieved: Any) -> Any
         # The measurement is held, and so is the time at which the law sees it.
         stepped = runge_kutta(lambda _, at: law.rate(t, y, at, wanted, achieved), t, symbol, law.hold)
         moved[others] = stepped[others]
-    return ca.substitute(moved, symbol, m)
+    return at(moved, symbol, m)
+
+
+def at(expression: Any, symbol: Any, value: Any) -> Any:
+    """Return an expression of a symbol at a value of it."""
+    return ca.substitute(expression, symbol, value)
 
 
 def _affine_rows(law: Law, slope: ca.SX, symbol: ca.SX) -> list[int]:

@@ -19,13 +19,15 @@ import numpy as np
 from casadi_gnc.allocation import OnlineInFlight
 from casadi_gnc.embedded.controller import Controller, Tunable
 from casadi_gnc.embedded.faults import Faults
+from casadi_gnc.embedded.named_nodes import Mark, marks
 from casadi_gnc.errors import PackageError, offer
 from casadi_gnc.laws import gains_of
 from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions import tapes
-from casadi_gnc.missions.loop import CREDIBLE, Loop
+from casadi_gnc.missions.loop import CREDIBLE, Loop, Symbols
 from casadi_gnc.missions.onboard_monitor import monitor_of
+from casadi_gnc.missions.onboard_names import listened
 from casadi_gnc.missions.onboard_notes import notes
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.status import StepStatus
@@ -71,6 +73,7 @@ def describe(
     actuation, truth = chosen.actuation, mission.truth
     raised = Loop(mission, chosen).raised()
     faults = _faults(mission, chosen, raised, fades=bool(parameters))
+    functions, named = _tapes(Loop(mission, chosen), symbols, fades=faults is not None and faults.fade > 0)
     return Controller(
         title=mission.title or mission.name,
         source=mission.source,
@@ -87,12 +90,13 @@ def describe(
         upper=tuple(float(value) for value in actuation.upper),
         least=tuple(float(value) for value in actuation.limit_below),
         most=tuple(float(value) for value in actuation.limit_above),
-        tapes=_tapes(Loop(mission, chosen), symbols, fades=faults is not None and faults.fade > 0),
+        tapes=functions,
         faults=faults,
         statuses={bit.value: (str(bit.name), bit.sentences[0]) for bit in raised},
         tunables=tuple(parameters),
         allocation=allocator.problem if isinstance(allocator, OnlineInFlight) else None,
         notes=notes(Loop(mission, chosen)),
+        marks=named,
         monitor=monitor_of(mission, Loop(mission, chosen), ca.vertcat(*symbols)) if monitored else None,
     )
 
@@ -121,12 +125,30 @@ def _faults(mission: Mission, scheme: Scheme, raised: Sequence[StepStatus], *, f
     return found if fades else replace(found, fade=0)
 
 
-def _tapes(loop: Loop, parameters: list[ca.SX], *, fades: bool) -> dict[str, ca.Function]:
-    """Return the tapes of the controller.
+def _tapes(
+    loop: Loop, parameters: list[ca.SX], *, fades: bool
+) -> tuple[dict[str, ca.Function], dict[str, tuple[Mark, ...]]]:
+    """Return the tapes of the controller, and what the law names on the way.
 
     What allocate, judge and after need that does not depend on the new actuators is computed in
     `before`, where it shares subexpressions with the law, and carried over in a column.
     """
+    with listened() as named:
+        s, made, inputs = _expressions(loop, fades=fades)
+    p, known = ca.vertcat(*parameters), {**inputs, **s.ports("limited", "lower", "upper")}
+    made, e, functions = _without_parameters(made, p)
+    taken = ca.SX(made["before"][1]["accepted"])
+    made = _carried(made, ca.vertcat(*inputs.values(), *([e["e"]] if e else [])))
+    for name, (ports, outputs) in made.items():
+        functions[name] = tapes.function(name, {**ports, **e}, outputs)
+    known |= {"told": made["after"][0]["told"], "p": p}
+    seen = zip(loop.plant.measurement.signals, notes(loop)["before"]["accepted"], strict=True)
+    accepted = [(what, taken[loop.plant.measurement.place(signal.name)]) for signal, (_, what) in seen]
+    return functions, marks(functions, [*accepted, *named], known)
+
+
+def _expressions(loop: Loop, *, fades: bool) -> tuple[Symbols, _Made, dict[str, Any]]:
+    """Return the columns of a sample, the tapes as expressions, and what is known before the allocation."""
     s = loop.symbols()
     first = loop.before(s.t, s.y, s.good, s.m, s.actuators)
     inputs = s.ports("t", "y", "good", "m", "actuators")
@@ -148,11 +170,7 @@ def _tapes(loop: Loop, parameters: list[ca.SX], *, fades: bool) -> dict[str, ca.
         allocated = loop.allocated(y, s.limited, s.actuators, s.lower, s.upper)
         made["allocate"] = (s.ports("limited", "actuators", "lower", "upper"), {"allocated": allocated})
     made |= {name: ({"told": told}, outputs) for name, outputs in late.items()}
-    made, e, functions = _without_parameters(made, ca.vertcat(*parameters))
-    made = _carried(made, ca.vertcat(*inputs.values(), *([e["e"]] if e else [])))
-    for name, (ports, outputs) in made.items():
-        functions[name] = tapes.function(name, {**ports, **e}, outputs)
-    return functions
+    return s, made, inputs
 
 
 def _fading(loop: Loop, first: dict[str, Any]) -> dict[str, ca.SX]:

@@ -10,7 +10,10 @@ from casadi_gnc.embedded import programs, saving
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.flight_function import flight_function
 from casadi_gnc.embedded.function_source import function_files
+from casadi_gnc.embedded.named_nodes import marks
+from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.embedded.program_text import print_program
+from casadi_gnc.embedded.scalars import graph
 from casadi_gnc.embedded.source import render_source
 from casadi_gnc.missions.onboard import describe
 
@@ -23,7 +26,7 @@ def code(text: str) -> str:
 def test_blocks_are_named_at_no_cost_and_kept():
     controller = describe(casadi_gnc.load("huang2020/slew"), "funnel_pinv")
     text = render_source(controller, Options("slew"))
-    plain = render_source(dataclasses.replace(controller, notes={}), Options("slew"))
+    plain = render_source(dataclasses.replace(controller, notes={}, marks={}), Options("slew"))
     assert code(text) == code(plain)
     assert render_source(saving.from_text(saving.to_text(controller)), Options("slew")) == text
     blocks = re.sub(r"\n\s+\* ", " ", text)
@@ -31,12 +34,51 @@ def test_blocks_are_named_at_no_cost_and_kept():
     law = "casadi_gnc/laws/prescribed_performance.py"
     assert f"PrescribedPerformance.command in {law}: u_c0, (3,), [N m] (eq. 36)" in blocks
     assert f"PrescribedPerformance.rate in {law}: the rate of the memory (eqs 32, 38 and 39)" in blocks
-    assert "    /* status again */" in blocks
+    assert "    /* PerformanceFunnel.error in casadi_gnc/laws/performance_funnel.py again */" in blocks
+    # What the law names on its way, in the order in which it is computed, each where it first stands.
+    quantities = ("PerformanceFunnel.error", "RigidBody.gravity_gradient", "DisturbanceObserver.estimate")
+    assert all(f"/* {each} in casadi_gnc/" in blocks for each in quantities)
+    assert "PerformanceFunnel.spread in casadi_gnc/laws/performance_funnel.py: 1/r = ds/de" in blocks
+    accepted = blocks[blocks.index("/* mrp: the measurement") :].partition("/* rate: the measurement")[0]
+    assert accepted.count("input->mrp[") == 3
+    assert "state->memory" not in accepted
     # Every statement of a step stands in a block.
     step = text[text.index("static void before(") : text.index("static void allocate(")]
     first = step.index("const gnc_")
     assert step.rindex("/*", 0, first) > 0
     assert not re.search(r"/\*", code(text))
+
+
+def test_a_named_scalar_is_found_in_every_tape_that_computes_it():
+    x, y, free = ca.SX.sym("x", 2), ca.SX.sym("y"), ca.SX.sym("free")
+    angle = ca.atan2(x[0], x[1])
+    first = ca.Function("first", [x], [ca.sin(angle) * 2], ["x"], ["carried"])
+    handed = ca.SX.sym("carried")
+    second = ca.Function("second", [handed, y], [3 - handed * y, y], ["carried", "y"], ["r", "s"])
+    named = [("angle", angle), ("minus", -(ca.sin(angle) * 2 * y)), ("elsewhere", free * x)]
+    found = marks({"first": first, "second": second}, named, {"x": x, "y": y})
+    places = {name: [f"{name}[{i}]" for i in range(2)] for name in ("x", "y", "carried", "r", "s")}
+    told = {
+        name: [(title, [graph(tape, places)[0][k].code for k in nodes]) for title, nodes in found[name]]
+        for name, tape in (("first", first), ("second", second))
+    }
+    assert told == {"first": [("angle", [ca.OP_ATAN2])], "second": [("minus", [ca.OP_MUL])]}
+
+
+def test_few_lines_of_a_block_told_before_get_no_heading():
+    x = ca.SX.sym("x", 3)
+    one = ca.sin(x[0]) * ca.cos(x[1]) + ca.exp(x[2]) * x[0]
+    tape = ca.Function("tape", [x], [ca.vertcat(one * one + 1, one * x[1], ca.sqrt(x[1]) * one)], ["x"], ["y"])
+    nodes, results = graph(tape, {"x": ["x[0]", "x[1]", "x[2]"], "y": ["y[0]", "y[1]", "y[2]"]})
+    named = next(k for k, node in enumerate(nodes) if node.code == ca.OP_ADD)
+    titles = {"y[0]": "y: all", "y[1]": "y: all", "y[2]": "y: all"}
+    text = print_function(tape, titles=titles, marks=[("one: the product", (named,))])
+    plain = print_function(tape)
+    assert code(text) == code(plain)
+    headings = re.findall(r"/\* (.*) \*/\n(.*)", text)
+    assert [heading for heading, _ in headings] == ["one: the product", "y: all"]
+    assert f"const gnc_real a{named} =" in text.partition("/* y: all */")[0]
+    assert len(results) == 3
 
 
 def test_rounding_of_constants_is_shown():
