@@ -3,7 +3,8 @@
     python tests/bench/function_speed.py
 
 Processor time of one call in nanoseconds, the least of several runs, both compiled with -O2, ours with the elementary
-functions that are the same everywhere; then the shifted geometric mean of the ratios of times (shift 10 ns).
+functions that are the same everywhere; then the shifted geometric mean of the ratios of times (shift 10 ns), of each
+family and of all.
 """
 
 from __future__ import annotations
@@ -96,21 +97,31 @@ def nanoseconds(text: str, function: ca.Function) -> float:
     return min(run(times) for _ in range(RUNS)) / times
 
 
+def families() -> dict[str, list[ca.Function]]:
+    """Return the functions of the set that are measured, by family."""
+    own = functions_of
+    return {
+        "missions": own.steps_of_missions(),
+        "network and filter": [own.network(), own.kalman(solve=False)],
+        "calls, maps, tables": own.shapes()[-12:],
+        "random graphs": [own.random_graph(seed, 150) for seed in range(3)],
+    }
+
+
 def main() -> None:
     """Print a line a function, and the means."""
-    own = functions_of
-    functions = [own.network(), own.kalman(solve=False), *own.steps_of_missions(), *own.shapes()[-12:]]
-    functions += [own.random_graph(seed, 150) for seed in range(3)]
-    rows = []
-    for function in functions:
-        texts = ours(function), casadis(function, best=False), casadis(function, best=True)
-        rows.append([nanoseconds(text, function) for text in texts])
-        print(
-            f"{function.name():12} {function.n_instructions():6}", *(f"{each:10.1f}" for each in rows[-1]), flush=True
-        )
-    times = np.array(rows) + SHIFT
-    for i, name in ((1, "default"), (2, "best options")):
-        print(f"CasADi's C, {name}: {np.exp(np.log(times[:, i] / times[:, 0]).mean()):.2f} times our time")
+    times = {}
+    for family, functions in families().items():
+        rows = []
+        for function in functions:
+            texts = ours(function), casadis(function, best=False), casadis(function, best=True)
+            rows.append([nanoseconds(text, function) for text in texts])
+            numbers = "".join(f"{each:11.1f}" for each in rows[-1])
+            print(f"{function.name():12} {function.n_instructions():6}{numbers}", flush=True)
+        times[family] = np.array(rows) + SHIFT
+    for family, rows in {**times, "all": np.concatenate([*times.values()])}.items():
+        default, best = (np.exp(np.log(rows[:, i] / rows[:, 0]).mean()) for i in (1, 2))
+        print(f"{family} ({len(rows)}): CasADi's C {default:.2f}, with best options {best:.2f} times our time")
 
 
 if __name__ == "__main__":
