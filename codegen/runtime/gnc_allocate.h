@@ -109,6 +109,13 @@ typedef float GNC_ALLOC_NAME(real);
 typedef double GNC_ALLOC_NAME(real);
 #endif
 
+/* A bit for each actuator. */
+#if GNC_ALLOC_N > 32
+typedef uint64_t GNC_ALLOC_NAME(set);
+#else
+typedef uint32_t GNC_ALLOC_NAME(set);
+#endif
+
 /* The problem as the user states it; the set-up reads it once. */
 typedef struct {
     GNC_ALLOC_NAME(real) A0[GNC_ALLOC_R][GNC_ALLOC_N];
@@ -167,7 +174,7 @@ typedef struct {
     GNC_ALLOC_NAME(real) C[GNC_ALLOC_K][GNC_ALLOC_K], inv_L[GNC_ALLOC_K], inv_C[GNC_ALLOC_K];
     GNC_ALLOC_NAME(real) T[GNC_ALLOC_K][GNC_ALLOC_K], Tt[GNC_ALLOC_K][GNC_ALLOC_K];
     GNC_ALLOC_NAME(real) lambda_W[GNC_ALLOC_V]; /* vertex weights that made W and T */
-    uint32_t free_set;                          /* bit i: actuator i was free */
+    GNC_ALLOC_NAME(set) free_set;               /* bit i: actuator i was free */
     uint32_t stamp;                             /* of the data they belong to, 0: none */
 } GNC_ALLOC_NAME(workspace);
 

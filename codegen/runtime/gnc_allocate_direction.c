@@ -66,10 +66,10 @@ static void solve_for_T(workspace_t *work)
 int NAME(refresh_factors)(workspace_t *work, const data_t *data, int always)
 {
     int i, v, known, same_set, same_weights, sound = 1;
-    uint32_t free_set = 0, bit = 1;
+    NAME(set) free_set = 0, bit = 1;
     real drift = 0;
     for (i = 0; i < N; ++i) {
-        free_set |= work->side[i] != 0 ? 0U : bit;
+        free_set |= work->side[i] != 0 ? (NAME(set))0 : bit;
         bit <<= 1;
     }
     for (v = 0; v < V; ++v) {
