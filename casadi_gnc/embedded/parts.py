@@ -124,7 +124,7 @@ class Parts:
             called.instruction_id(k) == ca.OP_CALL for k in range(called.n_instructions())
         )
         again = self._called.get(called.__hash__(), 0) - 1
-        size = programs.expanded(called, called.name()).n_instructions()
+        size = programs.operations(called)
         return size > programs.SMALL and max(again, 2 * calls) * size > programs.WRITTEN_OUT
 
     def _printed(self, function: ca.Function, k: int, place: str) -> Callee:

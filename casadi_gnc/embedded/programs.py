@@ -10,6 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache, wraps
+from typing import TypeVar
 
 import casadi as ca
 
@@ -115,12 +117,44 @@ def _opened(function: ca.Function) -> ca.Function:
     return function.slice(function.name(), list(range(function.n_in())), list(range(function.n_out())))
 
 
+class _Same:
+    """Stand for a function in a table: CasADi makes a new Python object of it at each place where it is called."""
+
+    def __init__(self, function: ca.Function) -> None:
+        self.function = function
+
+    def __hash__(self) -> int:
+        return self.function.__hash__()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and hash(self) == hash(other)
+
+
+_Found = TypeVar("_Found")
+
+
+def _once(look: Callable[[ca.Function], _Found]) -> Callable[[ca.Function], _Found]:
+    """Look at a function once, not at each of its calls; the latest ones stay alive, so that no other takes a hash."""
+
+    @lru_cache(maxsize=64)
+    def kept(same: _Same) -> _Found:
+        return look(same.function)
+
+    @wraps(look)
+    def looked(function: ca.Function) -> _Found:
+        return kept(_Same(function))
+
+    return looked
+
+
+@_once
 def is_never_inlined(function: ca.Function) -> bool:
     """Tell whether whoever made a plain function wants it to stay one, by CasADi's option never_inline."""
     symbols = function.sx_in()
     return _has_calls(ca.Function("probe", symbols, function.call(symbols)))
 
 
+@_once
 def is_plain(function: ca.Function) -> bool:
     """Tell whether a function is scalars alone: no branch, map, table or linear system in it or in what it calls."""
     if function.is_a("SXFunction"):
@@ -162,6 +196,12 @@ def expanded(function: ca.Function, place: str) -> ca.Function:
             said = f"has a node {node[1]}" if node else f"is no scalars ({str(error).strip().splitlines()[-1][-200:]})"
             raise PrinterError(f"{place} {said}, which has no C form here; write it in other operations") from None
     return check_size(found, place)
+
+
+@_once
+def operations(function: ca.Function) -> int:
+    """Return how many operations a plain function is; raise `PrinterError` where CasADi cannot make scalars of it."""
+    return expanded(function, function.name()).n_instructions()
 
 
 def check_size(function: ca.Function, place: str) -> ca.Function:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from printed_functions import Printed, everything, on_the_machine, same_words
 
+from casadi_gnc.embedded import programs
 from casadi_gnc.embedded.parts import Parts
 from casadi_gnc.errors import PrinterError
 
@@ -51,6 +52,19 @@ def test_pieces_are_printed_once_and_as_what_they_are():
     many.function(ca.Function("step", [x, u], [later]).mapaccum("steps", 100))
     assert many.text().count("gnc_cos(") == 20  # those of one step, not of a hundred
     assert re.search(r"if \(\(which > -1\.\) && \(which < 1\.\)\)", text)
+
+
+def test_a_function_is_looked_at_once_however_often_it_is_called(monkeypatch):
+    s, x = ca.SX.sym("s", 2), ca.MX.sym("x", 2)
+    calm = ca.Function("calm", [s], [ca.sin(s) * ca.sumsqr(s) + sum((s[0] / (k + 2) for k in range(40)), s[1])])
+    law = ca.Function("law", [x], [sum((calm(x * k) for k in range(1, 31)), x)])
+    looked, has_calls = [], programs._has_calls
+    monkeypatch.setattr(programs, "_has_calls", lambda function: looked.append(function.name()) or has_calls(function))
+    parts = Parts()
+    parts.function(law)
+    assert sum("f_calm(" in line for line in parts.text().splitlines() if ";" in line) == 30
+    assert looked.count("probe") == 1
+    assert looked.count("calm") <= 3
 
 
 def test_functions_that_are_never_inlined_stay_functions_wherever_they_are_called(rng):
