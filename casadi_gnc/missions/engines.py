@@ -19,6 +19,7 @@ from casadi_gnc.allocation import OnlineInFlight, online
 from casadi_gnc.embedded.printer import Math, c_constant, print_function
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mathematics.noise import uniform_count
+from casadi_gnc.missions.metrics import unflagged
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.tapes import Tapes, call
@@ -120,10 +121,12 @@ def flight_source(
     fused = "stage" in tapes.functions
     configure = tapes.functions.get("configure")
     unused = ("before", "allocate") if fused else ("plant",)
+    printed = {name: tape for name, tape in tapes.functions.items() if name not in unused}
+    printed["tally_unflagged"] = unflagged(printed["tally"], tapes.row)
 
     def called(name: str, sample: str = "s->", **places: str) -> str:
         """Return the call of a tape; `sample` owns what one evaluation of the controller leaves behind."""
-        return call(tapes.functions[name], _places(sample) | places)
+        return call(printed[name], _places(sample) | places)
 
     return template("flight.c.j2").render(
         **flight_facts(mission, scheme),
@@ -143,11 +146,11 @@ def flight_source(
         failed=StepStatus.ALLOCATION_FAILED.value,
         fused=fused,
         call=called,
-        tapes=[
-            print_function(tape, maths=maths, shared=SHARED if side_by_side else None)
-            for name, tape in tapes.functions.items()
-            if name not in unused
-        ],
+        status=tapes.row.place("status").start,
+        tapes={
+            name: print_function(tape, maths=maths, shared=SHARED if side_by_side else None)
+            for name, tape in printed.items()
+        },
     )
 
 

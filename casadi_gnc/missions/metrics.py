@@ -69,6 +69,15 @@ def fold(metrics: Sequence[Metric], row: Layout, watches: Sequence[Watch] = ()) 
     return layout, ca.Function("tally", [sample, tally], result, ["row", "tally"], ["tallied"])
 
 
+def unflagged(fold: ca.Function, row: Layout) -> ca.Function:
+    """Return the fold of a sample whose status is 0: the same words without the operations on its bits."""
+    sample, tally = row.symbol("row"), ca.SX.sym("tally", fold.numel_in("tally"))
+    quiet = ca.SX(sample)
+    quiet[row.place("status")] = 0
+    result = ca.cse([ca.SX(fold(quiet, tally))])
+    return ca.Function("tally_unflagged", [sample, tally], result, ["row", "tally"], ["tallied"])
+
+
 def _column(metric: Metric) -> str:
     """Return the name of a metric's place in the tally, apart from all others."""
     return f"metric_{metric.name}"
