@@ -14,11 +14,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.checking.linear import held, loop_at, moving_rows
+from casadi_gnc.checking.linear import held, loop_at, moving_rows, moving_states
 from casadi_gnc.checking.margins import BrokenLoop, Margins, common_gain, disk_of_all, margins
 from casadi_gnc.checking.sampling import settled
 from casadi_gnc.errors import FlightError
-from casadi_gnc.missions.linear_plant import names_of, rows_of, unlimited
+from casadi_gnc.missions.linear_plant import names_of, unlimited
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
@@ -131,7 +131,7 @@ def _slopes(mission: Mission, scheme: Scheme) -> ca.Function:
     remembered, wanted = loop.commanded(s.t, seen, s.m)
     made = loop.made(y, unlimited(mission, scheme, y, wanted))
     later = (loop.advanced if sampled else loop.flowing)(s.t, seen, remembered, wanted, made)
-    rows = rows_of(mission)
+    rows = moving_states(mission)
     slopes = [
         ca.jacobian(x[rows], s.x[rows]),
         ca.jacobian(x[rows], effort),

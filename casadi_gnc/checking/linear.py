@@ -1,8 +1,8 @@
 """The closed loop, linearised at its target with actuators that do what they are told.
 
-What a craft regulates (`Mission.target`) and the law's memory are the state; everything else of the
-plant stays as at the start. A target that moves is held still where it is at the start (`held`). Sampled, one step of
-the map is one sample period; continuous, the slope is that of plant and law together.
+What a craft regulates (`Mission.target`), what swings beside it (`Mission.swinging`) and the law's memory are the
+state; everything else of the plant stays as at the start. A target that moves is held still where it is at the start
+(`held`). Sampled, one step of the map is one sample period; continuous, the slope is that of plant and law together.
 """
 
 from __future__ import annotations
@@ -44,6 +44,20 @@ _HUGE = 1e150
 _KEPT = 16
 
 
+def moving_states(mission: Mission) -> list[int]:
+    """Return the rows of the plant's state that the linear loop has: what is regulated, then what swings."""
+    places = [mission.truth.state.place(name) for name in mission.swinging]
+    return rows_of(mission) + [row for place in places for row in range(place.start, place.stop)]
+
+
+def state_at_rest(mission: Mission) -> np.ndarray:
+    """Return the plant's state at the target with what swings at rest."""
+    x = target_state(mission)
+    for name, values in mission.swinging.items():
+        x[mission.truth.state.place(name)] = values
+    return x
+
+
 @lru_cache(maxsize=_KEPT)
 def loop_at(mission: Mission, scheme: Scheme, t: float) -> LinearLoop:
     """Return the linear loop at time t [s]; asked again, the same."""
@@ -65,7 +79,7 @@ class LinearLoop:
 
     @cached_property
     def matrix(self) -> np.ndarray:
-        """The Jacobian over what is regulated, then the memory."""
+        """The Jacobian over what is regulated, then what swings, then the memory."""
         return self._jacobians[0]
 
     @property
@@ -134,7 +148,7 @@ class LinearLoop:
     def target(self) -> tuple[np.ndarray, np.ndarray]:
         """The plant's state at the target, and the memory that a law starts with there."""
         mission = self.mission
-        x0 = target_state(mission)
+        x0 = state_at_rest(mission)
         y0 = ca.DM(mission.truth.measure(self.t, ca.DM(x0), mission.quiet()))
         m0 = ca.DM(Loop(mission, self.scheme).started(ca.DM(self.t), y0))
         return x0, np.array(m0).ravel()
@@ -142,7 +156,7 @@ class LinearLoop:
     @lru_cache(maxsize=1)  # noqa: B019 - loops are few and kept by `loop_at` anyway
     def pushed(self, samples: int) -> np.ndarray:
         """Return where what depends on time drives the loop from its target: regulated states, (samples, n)."""
-        mission, rows = self.mission, rows_of(self.mission)
+        mission, rows = self.mission, moving_states(self.mission)
         x0, m0 = self.target
         h = mission.timing.duration / samples
         times = np.arange(samples) * h
@@ -158,7 +172,7 @@ class LinearLoop:
             # exp of [[A, I], [0, 0]] h holds the exact step and the exact effect of a held push.
             joint = linalg.expm(h * np.block([[self.matrix, np.eye(size)], [np.zeros((size, 2 * size))]]))
             step, push = joint[:size, :size], moved @ joint[:size, size:].T
-        return driven(step, push)[:, : len(rows)]
+        return driven(step, push)[:, : len(rows_of(mission))]
 
 
 def driven_at_the_end(mission: Mission, scheme: Scheme, part: float) -> np.ndarray | None:
@@ -224,7 +238,7 @@ def _functions(mission: Mission, scheme: Scheme) -> tuple[ca.Function, ca.Functi
     else:
         later = loop.flowing(s.t, seen, remembered, wanted, told)
     made, effectiveness = loop.made(y, actuators), ca.SX(_effectiveness(loop, y))
-    rows, late = rows_of(mission), s.actuators
+    rows, late = moving_states(mission), s.actuators
     state = ca.vertcat(s.x[rows], s.m)
     closed = ca.vertcat(ca.substitute(x, late, actuators)[rows], ca.substitute(later, told, made))
     # With a sample of delay the actuators are a state: the plant feels the old, the law sets the new.

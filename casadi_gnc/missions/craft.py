@@ -115,6 +115,13 @@ class Craft(Part):
         """Return the states that the laws regulate, by name, and the values that they bring them to."""
         return {}
 
+    def swinging(self, mission: Mission) -> Mapping[str, Sequence[float]]:
+        """Return states that move beside what is regulated, and where they rest: bending modes, liquids.
+
+        The linear loop has them, so that `check` and `casadi-gnc margins` say whether a law excites them.
+        """
+        return {}
+
     def held(self, mission: Mission) -> Mission | None:
         """Return the mission with its target held still, where the target moves; the linear checks look at that."""
         return None

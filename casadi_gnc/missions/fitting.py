@@ -90,15 +90,15 @@ def _given(value: Any) -> str:
     return f"the class {value.__name__}" if isinstance(value, type) else f"an object of type {type(value).__name__}"
 
 
-def goals(mission: Mission) -> Mapping[str, Sequence[float]]:
-    """Return what a craft says is regulated; raise `FlightError` where that is no state of its plant."""
+def goals(mission: Mission, hook: str = "regulated") -> Mapping[str, Sequence[float]]:
+    """Return what a craft says is regulated, or swings; raise `FlightError` where that is no state of its plant."""
     state, craft = mission.truth.state, type(mission.craft).__name__
-    found: Mapping[str, Sequence[float]] = asking.ask(mission.craft, "regulated", mission)
+    found: Mapping[str, Sequence[float]] = asking.ask(mission.craft, hook, mission)
     for name, goal in found.items():
         if name not in state:
-            raise FlightError(f"{craft}.regulated names {name!r}, which is no state; {offer(name, state.names)}")
+            raise FlightError(f"{craft}.{hook} names {name!r}, which is no state; {offer(name, state.names)}")
         if len(goal) != state.signal(name).size:
-            raise FlightError(f"{craft}.regulated gives {len(goal)} numbers of {name}, not {state.signal(name).size}")
+            raise FlightError(f"{craft}.{hook} gives {len(goal)} numbers of {name}, not {state.signal(name).size}")
     return found
 
 

@@ -130,6 +130,11 @@ class Mission:
         return fitting.goals(self)
 
     @property
+    def swinging(self) -> Mapping[str, Sequence[float]]:
+        """The states that move beside what is regulated, by name, and where they rest."""
+        return fitting.goals(self, "swinging")
+
+    @property
     def digest(self) -> str:
         """Hash of what the mission was made of: its file with changes and guests, or its data and classes."""
         return self.origin.digest if self.origin is not None else _digest(self)

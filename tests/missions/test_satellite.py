@@ -43,6 +43,15 @@ frequency_Hz = 0.1
 damping = 0.01
 rotation_kg05_m = [1.0, 0.0, 0.0]
 """
+PANEL = """
+[[hinged_panel]]
+mass_kg = 6.0
+inertia_kg_m2 = [[2.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 2.2]]
+hinge_m = [0.0, 0.5, 0.0]
+axis = [1.0, 0.0, 0.0]
+centre_m = [0.0, 1.5, 0.0]
+stiffness_N_m_per_rad = 3.0
+"""
 WRONG = {
     "axis": (WHEEL.format("[0.6, 0.0, 0.9]"), "wheel[4].axis: a direction of length 1.082, expected a unit vector"),
     "inertia": ("[[wheel]]\naxis = [1.0, 0.0, 0.0]\nmax_torque_N_m = 0.1", "wheel[4]: give inertia_kg_m2, or both"),
@@ -60,6 +69,15 @@ WRONG = {
     ),
     "undamped": (MODE.replace("damping = 0.01\n", ""), "flexible_mode[1].damping: is missing"),
     "heavy": (MODE.replace("[1.0, 0", "[5.0, 0"), "spacecraft: wheels and modes have more inertia about some axis"),
+    "hinge": (
+        PANEL.replace("[1.0, 0", "[1.0, 1"),
+        "hinged_panel[1].axis: a direction of length 1.414, expected a unit",
+    ),
+    "sheet": (
+        PANEL.replace("[[2.0", "[[9.0"),
+        "hinged_panel[1].inertia_kg_m2: ",
+    ),
+    "loose": (PANEL.replace("= 3.0", "= 0.0"), "hinged_panel[1].stiffness_N_m_per_rad: is 0.0, expected a number > 0"),
     "twice": (
         "[initial]\nmrp = [0.1, 0.0, 0.0]\naxis = [1.0, 0.0, 0.0]\nangle_deg = 5.0",
         "initial: the attitude is given 2 times, by mrp and axis",

@@ -1,4 +1,5 @@
-"""A satellite in Basilisk, by the keys that our craft takes: balanced wheels, liquids on springs, thrusters, gravity.
+"""A satellite in Basilisk, by the keys that our craft takes: balanced wheels, liquids on springs, hinged
+panels, thrusters, gravity.
 
 Basilisk integrates position and velocity of the body's origin besides; its wheels' Coulomb friction is a sign where
 ours is a tanh, so wheels must not cross zero.
@@ -14,7 +15,7 @@ import numpy as np
 def fly(
     keys: dict[str, Any], start: dict[str, Any], *, h: float, duration: float, told: dict[str, list[float]]
 ) -> dict:
-    """Return mrp, rate, wheel_speed, slosh at the samples of a flight under constant commands.
+    """Return mrp, rate, wheel_speed, slosh, panel_angle at the samples of a flight under constant commands.
 
     Parameters
     ----------
@@ -27,6 +28,7 @@ def fly(
         GravityGradientEffector,
         extForceTorque,
         gravityEffector,
+        hingedRigidBodyStateEffector,
         linearSpringMassDamper,
         reactionWheelStateEffector,
         spacecraft,
@@ -76,6 +78,23 @@ def fly(
         mass.rhoInit, mass.rhoDotInit = float(start["slosh"][i]), 0.0
         craft.addStateEffector(mass)
         liquids.append(mass)
+    panels = []
+    for i, table in enumerate(keys.get("hinged_panel", [])):
+        panel = hingedRigidBodyStateEffector.HingedRigidBodyStateEffector()
+        # Its frame at rest: from the centre of mass to the hinge, along the hinge, and what completes them.
+        arm = np.subtract(table["centre_m"], table["hinge_m"])
+        first, second = -arm / np.linalg.norm(arm), np.array(table["axis"])
+        frame = np.array([first, second, np.cross(first, second)])
+        panel.mass, panel.d = table["mass_kg"], float(np.linalg.norm(arm))
+        panel.IPntS_S = (frame @ np.array(table["inertia_kg_m2"]) @ frame.T).tolist()
+        panel.dcm_HB, panel.r_HB_B = frame.tolist(), column(table["hinge_m"])
+        panel.k, panel.c = table["stiffness_N_m_per_rad"], table.get("damping_N_m_s_per_rad", 0.0)
+        panel.thetaInit, panel.thetaDotInit = float(start["panel_angle"][i]), float(start["panel_rate"][i])
+        panel.ModelTag = f"panel_{i}"
+        craft.addStateEffector(panel)
+        simulation.AddModelToTask("task", panel, 5)
+        recorders[panel.ModelTag] = panel.hingedRigidBodyOutMsg.recorder()
+        panels.append(panel)
     if keys.get("thruster"):
         force = sum(f * np.array(one["direction"]) for f, one in zip(told["force"], keys["thruster"], strict=True))
         torque = sum(
@@ -98,6 +117,8 @@ def fly(
         found["wheel_speed"] = np.array(recorders["wheels"].wheelSpeeds)[:, : len(keys["wheel"])]
     if liquids:
         found["slosh"] = np.array([each.getState()[0][0] for each in logged])  # at the end
+    if panels:
+        found["panel_angle"] = np.stack([np.array(recorders[each.ModelTag].theta) for each in panels], axis=1)
     return found
 
 

@@ -12,6 +12,7 @@ from casadi_gnc.mathematics.integrators import runge_kutta
 from casadi_gnc.mathematics.linear import solve_symmetric
 from casadi_gnc.mechanics import attitude
 from casadi_gnc.mechanics.appendages import FlexibleModes, SloshMasses
+from casadi_gnc.mechanics.hinged_panels import HingedPanels
 from casadi_gnc.mechanics.multibody import Assembly
 from casadi_gnc.mechanics.satellite_parts import Thrusters, Wheels
 from casadi_gnc.vehicles.satellite import SatelliteCraft
@@ -25,7 +26,19 @@ def units(generator: np.random.Generator, count: int) -> ca.DM:
     return ca.DM(columns / np.linalg.norm(columns, axis=0))
 
 
-def random_parts(seed: int, wheels: int, modes: int, liquids: int) -> Assembly:
+def random_panels(generator: np.random.Generator, count: int) -> HingedPanels:
+    """Panels of some 10 kg whose hinges are no principal axes, at angles of up to a radian."""
+    inertias = []
+    for _ in range(count):
+        turn = np.linalg.qr(generator.normal(size=(3, 3)))[0]
+        inertias.append(ca.DM(turn @ np.diag([3.0, 2.0, 4.0]) @ turn.T))
+    hinges, arms = (ca.DM(generator.uniform(-0.8, 0.8, (3, count))) for _ in range(2))
+    given = [list(generator.uniform(low, high, count)) for low, high in ((5, 15), (2, 8), (-1, 1), (-0.3, 0.3))]
+    masses, stiffness, angle, rate = given
+    return HingedPanels(masses, inertias, hinges, units(generator, count), arms, stiffness, [0.0] * count, angle, rate)
+
+
+def random_parts(seed: int, wheels: int, modes: int, liquids: int, panels: int = 0) -> Assembly:
     """A craft of some 100 kg and 30 kg m^2 whose parts are frictionless and swing slowly."""
     generator, parts = np.random.default_rng(seed), []
     if wheels:
@@ -43,7 +56,10 @@ def random_parts(seed: int, wheels: int, modes: int, liquids: int) -> Assembly:
         masses, places = list(generator.uniform(2, 12, liquids)), ca.DM(generator.uniform(-0.8, 0.8, (3, liquids)))
         offsets = list(generator.uniform(-0.2, 0.2, liquids))
         parts.append(SloshMasses(masses, places, units(generator, liquids), [6.0] * liquids, [0.0] * liquids, offsets))
-    return Assembly(100.0, generator.uniform(-0.2, 0.2, 3).tolist(), ca.DM(INERTIA), tuple(parts))
+    centre = generator.uniform(-0.2, 0.2, 3).tolist()
+    if panels:
+        parts.append(random_panels(generator, panels))
+    return Assembly(100.0, centre, ca.DM(INERTIA), tuple(parts))
 
 
 def coasting(body: Assembly, h: float) -> tuple[ca.Function, ca.Function, np.ndarray]:
@@ -67,15 +83,15 @@ def coasting(body: Assembly, h: float) -> tuple[ca.Function, ca.Function, np.nda
 
 
 @settings(max_examples=6, deadline=None)
-@given(st.integers(0, 10**6), st.integers(0, 8), st.integers(0, 3), st.integers(0, 2))
-def test_momentum_and_energy_are_conserved(seed, wheels, modes, liquids):
+@given(st.integers(0, 10**6), st.integers(0, 8), st.integers(0, 3), st.integers(0, 2), st.integers(0, 2))
+def test_momentum_and_energy_are_conserved(seed, wheels, modes, liquids, panels):
     """Twenty seconds at 4 ms; RK4 leaves h^4 of the fastest swing, some 1e-13, beside rounding of 5000 steps."""
-    step, kept, start = coasting(random_parts(seed, wheels, modes, liquids), 0.004)
+    step, kept, start = coasting(random_parts(seed, wheels, modes, liquids, panels), 0.004)
     end = np.array(step.fold(5000)(start)).ravel()
     (before, energy), (after, left) = (tuple(np.array(v).ravel() for v in kept(x)) for x in (start, end))
     assert np.linalg.norm(after - before) < 1e-11 * np.linalg.norm(before)
     assert abs(left - energy) < 1e-11 * energy
-    if modes or liquids:
+    if modes or liquids or panels:
         assert np.abs(end[6 + wheels :] - start[6 + wheels :]).max() > 1e-3  # something swung
 
 
@@ -89,6 +105,20 @@ def test_liquid_moves_as_two_masses_on_a_spring():
     turned, moved, _ = body.moved(0.0, ca.DM.zeros(3), own, None, ca.DM.zeros(3), None)
     assert np.allclose(np.array(ca.DM(turned)), 0, atol=1e-15)
     assert np.allclose(np.array(ca.DM(moved)).ravel(), [0.0, -4.5 * (1 / 6 + 1 / 30) * 0.1], rtol=1e-14)
+
+
+def test_a_panel_swings_against_a_body_that_is_free():
+    """In a plane, the hinge through the body's centre: k (1/J + 1/(I + m M d^2/(m + M))) of a small angle."""
+    panel = HingedPanels(
+        [6.0], [ca.diag(ca.DM([1.0, 2.0, 2.5]))], ca.DM.zeros(3, 1), ca.DM([0, 0, 1]), ca.DM([0.8, 0, 0]), [4.5], [0.3],
+        [1e-7], [0.0],
+    )  # fmt: skip
+    body, own = Assembly(30.0, [0.0] * 3, ca.DM([[24, 1, 0], [1, 30, 0], [0, 0, 34]]), (panel,)), SimpleNamespace()
+    own.panel_angle, own.panel_rate = ca.DM([1e-7]), ca.DM([0.0])
+    turned, moved, _ = body.moved(0.0, ca.DM.zeros(3), own, None, ca.DM.zeros(3), None)
+    swung = 2.5 + 6 * 30 / 36 * 0.8**2
+    assert np.allclose(np.array(ca.DM(moved)).ravel() / 1e-7, [0.0, -4.5 * (1 / 34 + 1 / swung)], rtol=1e-9)
+    assert np.allclose(np.array(ca.DM(turned)).ravel() / 1e-7, [0, 0, 4.5 / 34], rtol=1e-9, atol=1e-9)
 
 
 def test_a_body_with_liquid_is_two_points_and_a_body():

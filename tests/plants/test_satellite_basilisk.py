@@ -70,6 +70,35 @@ CASES = {
         ],
     },
 }
+#: Two arrays, alike but for their springs, one along the hinge's frame, one turned by half a right angle about y.
+ACROSS = 0.7071067811865476
+CASES["wheels and thrusters with hinged panels"] = {
+    "wheel": WHEELS,
+    "thruster": THRUSTERS,
+    "centre_of_mass_m": [0.1, -0.05, 0.2],
+    "hinged_panel": [
+        {
+            "mass_kg": 30.0,
+            "inertia_kg_m2": [[12.0, 0.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, 14.0]],
+            "hinge_m": [0.0, 0.7, 0.2],
+            "axis": [1.0, 0.0, 0.0],
+            "centre_m": [0.0, 2.2, 0.2],
+            "stiffness_N_m_per_rad": 30.0,
+            "damping_N_m_s_per_rad": 0.4,
+            "angle_deg": 4.0,
+            "rate_deg_per_s": -0.5,
+        },
+        {
+            "mass_kg": 25.0,
+            "inertia_kg_m2": [[8.0, 0.0, 3.0], [0.0, 14.0, 0.0], [3.0, 0.0, 8.0]],
+            "hinge_m": [0.1, -0.7, 0.1],
+            "axis": [ACROSS, 0.0, ACROSS],
+            "centre_m": [0.1, -1.9, 0.1],
+            "stiffness_N_m_per_rad": 20.0,
+            "angle_deg": -3.0,
+        },
+    ],
+}
 TOLD = {"wheel_torque": [4e-3, -2e-3, 3e-3, -5e-3], "force": [0.01, 0.005]}
 
 
@@ -100,6 +129,9 @@ def test_flights_agree(name):
         assert np.abs(here["wheel_speed"][-1] - here["wheel_speed"][0]).min() > 1
     if "slosh" in keys:
         assert np.abs(here["slosh"][-1] - there["slosh"]).max() < 1e-10
+    if "hinged_panel" in keys:
+        assert np.abs(here["panel_angle"] - there["panel_angle"]).max() < 1e-10
+        assert np.ptp(here["panel_angle"], axis=0).min() > 0.02
 
 
 def test_laws_command_the_same_torques():

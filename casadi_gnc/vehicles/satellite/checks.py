@@ -6,7 +6,13 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from casadi_gnc.checking.broken_loops import cuts
+from casadi_gnc.checking.linear import HELD, held
+from casadi_gnc.checking.sampling import settled
 from casadi_gnc.checks import Check
+from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
@@ -53,10 +59,11 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[
             "Shorten least_on_s and quantum_s, or sample slower.",
             "one pulse a sample",
         )
-    swings = [("flexible_mode", i, each.frequency_Hz) for i, each in enumerate(craft.flexible_mode, 1)]
-    swings += [("slosh", i, each.frequency_Hz) for i, each in enumerate(craft.slosh, 1)]
+    kinds = {"flexible_mode": craft.flexible_mode, "slosh": craft.slosh, "hinged_panel": craft.hinged_panel}
+    swings = [(kind, i, each.frequency_Hz) for kind, tables in kinds.items() for i, each in enumerate(tables, 1)]
     if not swings:
         return
+    yield from _bandwidth(mission, scheme, *min(swings, key=lambda each: each[2]))
     kind, number, fastest = max(swings, key=lambda each: each[2])
     named = f"{kind} {number}"
     if timing.mode == "sampled":
@@ -79,4 +86,32 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[
         f"The integrator takes fewer than {_STEPS} steps for a period of {named}: its swing is not followed well.",
         "Raise timing.plant_substeps.",
         f"a period of the fastest motion has {_STEPS} steps",
+    )
+
+
+def _bandwidth(mission: Mission, scheme: Scheme, kind: str, number: int, slowest: float) -> Iterator[Check]:
+    """Yield whether the loop, cut at an effort, has gains above one only below the slowest swing."""
+    still, own = held(mission, scheme)
+    if not still.target:
+        return
+    try:
+        loop, _ = cuts(still, own, settled(still))
+    except FlightError:
+        return  # a law without slope: said by others
+    last = 0.0
+    for i in range(loop.channels):
+        cut = loop.channel(i)
+        grid = cut.frequencies()
+        last = max(last, float(grid[np.abs(cut.at(grid)[:, 0, 0]) >= 1].max(initial=0.0)))
+    yield Check(
+        "sampling.bandwidth",
+        last / (2 * math.pi),
+        slowest,
+        "Hz",
+        "note",
+        f"The loop has gain at the frequency of {kind} {number} or above: whether it damps or drives it is up to its "
+        "phase, and to every delay.",
+        "Look at `casadi-gnc margins`, lower the gains, or filter what the law reads.",
+        "largest frequency at which the loop, cut at one effort, has gain one, against the lowest clamped frequency"
+        + (f"; {HELD}" if still is not mission else ""),
     )

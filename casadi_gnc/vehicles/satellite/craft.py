@@ -1,8 +1,8 @@
 """A satellite by tables: a rigid body in [spacecraft], and a table for each thing that it carries.
 
-Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]]; [orbit],
-[field], [environment], [[plate]], [air]; [[sensor]], [estimator]; [[reference]]; [truth], [initial]. A class derived
-from this one adds parts of its own in `components`.
+Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]],
+[[hinged_panel]]; [orbit], [field], [environment], [[plate]], [air]; [[sensor]], [estimator]; [[reference]]; [truth],
+[initial]. A class derived from this one adds parts of its own in `components`.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from .estimator_tables import AnyEstimator
 from .orbit_tables import Environment, FieldTable, OrbitTable
 from .part_tables import (
     FlexibleModeTable,
+    HingedPanelTable,
     MagnetorquerTable,
     MomentumTable,
     SloshTable,
@@ -74,9 +75,9 @@ class SatelliteCraft(Craft):
     example: ClassVar[str | None] = "satellites/slew"
     further_examples: ClassVar[tuple[str, ...]] = ("satellites/detumble_bdot",)
 
-    mass_kg: Positive = Field(description="with wheels and appendages, without [[slosh]]")
+    mass_kg: Positive = Field(description="with wheels and appendages, without [[slosh]] and [[hinged_panel]]")
     inertia_kg_m2: matrices.Inertia = Field(
-        description="about the centre of mass, body axes, wheels locked, appendages clamped, without [[slosh]]"
+        description="of that mass about its centre, body axes, wheels locked, appendages clamped"
     )
     centre_of_mass_m: Vector = Field(default=[0.0, 0.0, 0.0], description="from the origin of positions")
     rate_limit_rad_per_s: Positive = Field(default=10.0, description="larger measured rates per axis are rejected")
@@ -86,6 +87,7 @@ class SatelliteCraft(Craft):
     magnetorquer: list[MagnetorquerTable] = table([], "a coil; there may be several")
     flexible_mode: list[FlexibleModeTable] = table([], "a bending mode; there may be several")
     slosh: list[SloshTable] = table([], "a mass of liquid; there may be several")
+    hinged_panel: list[HingedPanelTable] = table([], "a panel on a hinge; there may be several")
     momentum: MomentumTable = table(MomentumTable())
     orbit: OrbitTable | None = table(None)
     field: FieldTable | None = table(None)
@@ -153,6 +155,7 @@ class SatelliteCraft(Craft):
             (self.magnetorquer, part_tables.magnetorquers),
             (self.flexible_mode, part_tables.modes),
             (self.slosh, part_tables.slosh),
+            (self.hinged_panel, part_tables.panels),
         ]
         return [made(tables) for tables, made in kinds if tables]
 
@@ -166,14 +169,14 @@ class SatelliteCraft(Craft):
         )
 
     def _at_rest(self) -> tuple[Any, Any]:
-        """Return inertia about the centre of mass and that centre as known, liquids at rest, appendages clamped."""
+        """Return inertia about the centre of mass and that centre as known, all that swings at rest."""
         known = self.assembly()
         rest = SimpleNamespace(**{each.name: ca.DM.zeros(each.size) for each in known.state.signals})
         return known.inertia(rest), known.centre(rest)
 
     def _free_inertia(self) -> Any:
-        """Return J - sum J_s g g', and without what the modes take along: what a sudden torque turns."""
-        free, centre = self._at_rest()
+        """Return J - sum J_s g g', and without what the modes take along: what a sudden torque turns of the body."""
+        free, centre = array(self.inertia_kg_m2), array(self.centre_of_mass_m)
         for each in self.wheel:
             axis = part_tables.directions([each], "axis")
             free = free - each.spin_inertia * ca.mtimes(axis, axis.T)
@@ -294,6 +297,12 @@ class SatelliteCraft(Craft):
             return {}
         still = array(pointed.at(0.0, None).quaternion)
         return {"mrp": quaternions.to_mrp(still).elements(), "rate": [0.0] * 3}
+
+    def swinging(self, mission: Mission) -> dict[str, list[float]]:
+        """Return the coordinates inside the parts and their speeds, at rest where springs have no force."""
+        moving = [pair for part in self.components() for pair in part.moving.items() if pair[1] is not None]
+        names = [name for speed, place in moving for name in (str(place), speed)]
+        return {name: [0.0] * mission.truth.state.signal(name).size for name in names}
 
     def held(self, mission: Mission) -> Mission | None:
         """Return the mission with the attitude that is wanted at t = 0 for good, where the reference moves."""

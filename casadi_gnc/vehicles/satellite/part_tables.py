@@ -1,4 +1,4 @@
-"""What a satellite carries, one table each: [[wheel]], [[thruster]], [[magnetorquer]], [[flexible_mode]], [[slosh]].
+"""What a satellite carries, one table each: [[wheel]], [[thruster]], [[magnetorquer]], and what swings.
 
 Positions and axes are in the body frame. Tables of one kind become one part of `casadi_gnc.mechanics`.
 """
@@ -17,6 +17,7 @@ from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import appendages
 from casadi_gnc.mechanics import satellite_parts as parts
 from casadi_gnc.mechanics.firing import FiringThrusters
+from casadi_gnc.mechanics.hinged_panels import HingedPanels
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
 
@@ -135,6 +136,25 @@ class SloshTable(Axial):
     offset_m: float = Field(default=0.0, description="from rest at t = 0")
 
 
+class HingedPanelTable(Axial):
+    """A rigid panel that a spring holds on a hinge along an axis."""
+
+    mass_kg: Positive = Field(description="beside the craft's mass_kg")
+    inertia_kg_m2: matrices.Inertia = Field(description="about its own centre of mass, body axes, at rest")
+    hinge_m: Vector = Field(description="a point on the hinge")
+    centre_m: Vector = Field(description="its centre of mass, at rest")
+    stiffness_N_m_per_rad: Positive
+    damping_N_m_s_per_rad: NonNegative = 0.0
+    angle_deg: float = Field(default=0.0, description="from rest at t = 0, by the right hand about the axis")
+    rate_deg_per_s: float = Field(default=0.0, description="at t = 0, relative to the body")
+
+    @property
+    def frequency_Hz(self) -> Any:
+        """Frequency with the body held, [Hz]."""
+        inertia = panels([self]).about_hinges()[0]
+        return math.sqrt(float(self.stiffness_N_m_per_rad) / float(inertia)) / (2 * math.pi)
+
+
 def columns(tables: Sequence[Any], key: str) -> Any:
     """Return a vector of each table as columns, (3, N)."""
     return array([list(getattr(table, key)) for table in tables]).T
@@ -204,6 +224,22 @@ def slosh(tables: Sequence[SloshTable]) -> appendages.SloshMasses:
         array([table.mass_kg * turn * turn for table, turn in zip(tables, turns, strict=True)]),
         array([2 * table.damping * table.mass_kg * turn for table, turn in zip(tables, turns, strict=True)]),
         _of(tables, "offset_m"),
+    )
+
+
+def panels(tables: Sequence[HingedPanelTable]) -> HingedPanels:
+    """Return the panels as one part."""
+    hinges, degree = columns(tables, "hinge_m"), math.pi / 180
+    return HingedPanels(
+        _of(tables, "mass_kg"),
+        [array(table.inertia_kg_m2) for table in tables],
+        hinges,
+        directions(tables, "axis"),
+        columns(tables, "centre_m") - hinges,
+        _of(tables, "stiffness_N_m_per_rad"),
+        _of(tables, "damping_N_m_s_per_rad"),
+        array([table.angle_deg * degree for table in tables]),
+        array([table.rate_deg_per_s * degree for table in tables]),
     )
 
 
