@@ -279,7 +279,9 @@ def test_a_day_of_looking_at_the_earth():
     late = flight["time"] > 3000
     # What is checked of the filter beforehand is what it says of itself, and what it truly errs by.
     craft: Any = mission.craft
-    (noise,) = pointing_checks.checks(craft, mission, mission.scheme())
+    limit = pointing_checks.wanted(mission)
+    assert limit is not None
+    (noise,) = pointing_checks.checks(craft, mission, mission.scheme(), limit)
     assert np.degrees(3 * flight["attitude_deviation"][late].max()) == pytest.approx(noise.value, rel=0.2)
     assert noise.value < flight["pointing_error_deg"][late].max() < noise.limit
     speeds = np.abs(flight["wheel_speed"][late])
