@@ -122,21 +122,10 @@ def instructions(function: ca.Function) -> tuple[float, float]:
     return float(own - empty) / DRAWS, float(other - empty) / DRAWS
 
 
-def families(*, everything: bool) -> dict[str, list[ca.Function]]:
-    """Return the functions by family; `everything` takes all of the test's set but the one of 2500 operations."""
-    own = speed.functions_of
-    found = speed.families()
-    if everything:
-        found["calls, maps, tables"] = own.shapes()
-        found["random graphs"] = [own.random_graph(seed, 20 + seed % 40) for seed in range(130)]
-        found["random graphs"] += [own.random_graph(1000 + seed, 150) for seed in range(15)]
-    return found
-
-
 def main(arguments: list[str]) -> None:
     """Print a line a function, and the means."""
     counts = {}
-    for family, functions in families(everything="all" in arguments).items():
+    for family, functions in speed.families(everything="all" in arguments).items():
         rows = []
         for function in functions:
             rows.append(instructions(function))

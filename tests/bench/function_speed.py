@@ -1,6 +1,7 @@
 """Time functions as printed here against CasADi's own C: its default, and expanded with common parts taken out.
 
-    python tests/bench/function_speed.py
+    python tests/bench/function_speed.py                # 41 functions
+    python tests/bench/function_speed.py all            # every function of tests/embedded/test_function_set.py
 
 Processor time of one call in nanoseconds, the least of several runs, both compiled with -O2, ours with the elementary
 functions that are the same everywhere; then the shifted geometric mean of the ratios of times (shift 10 ns), of each
@@ -97,21 +98,25 @@ def nanoseconds(text: str, function: ca.Function) -> float:
     return min(run(times) for _ in range(RUNS)) / times
 
 
-def families() -> dict[str, list[ca.Function]]:
-    """Return the functions of the set that are measured, by family."""
+def families(*, everything: bool) -> dict[str, list[ca.Function]]:
+    """Return the functions by family; `everything` takes all of the test's set but the one of 2500 operations."""
     own = functions_of
+    graphs = [own.random_graph(seed, 150) for seed in range(3)]
+    if everything:
+        graphs = [own.random_graph(seed, 20 + seed % 40) for seed in range(130)]
+        graphs += [own.random_graph(1000 + seed, 150) for seed in range(15)]
     return {
         "missions": own.steps_of_missions(),
         "network and filter": [own.network(), own.kalman(solve=False)],
-        "calls, maps, tables": own.shapes()[-12:],
-        "random graphs": [own.random_graph(seed, 150) for seed in range(3)],
+        "calls, maps, tables": own.shapes() if everything else own.shapes()[-12:],
+        "random graphs": graphs,
     }
 
 
-def main() -> None:
+def main(arguments: list[str]) -> None:
     """Print a line a function, and the means."""
     times = {}
-    for family, functions in families().items():
+    for family, functions in families(everything="all" in arguments).items():
         rows = []
         for function in functions:
             texts = ours(function), casadis(function, best=False), casadis(function, best=True)
@@ -125,4 +130,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])
