@@ -11,7 +11,7 @@ import numpy as np
 
 from casadi_gnc.allocation.allocator import Allocator
 from casadi_gnc.allocation.answer import AllocationStatus
-from casadi_gnc.allocation.online import OnlineSolver
+from casadi_gnc.allocation.online import FAST, OnlineSolver
 from casadi_gnc.allocation.problem import AllocationProblem
 from casadi_gnc.errors import AllocationError, NoCompilerError
 from casadi_gnc.mathematics import bounds, exact
@@ -130,17 +130,17 @@ class OnlineInFlight:
     problem: AllocationProblem
     report = CERTIFICATE
 
-    def solver(self, compiler: compilers.Compiler | None = None) -> OnlineSolver:
+    def solver(self, compiler: compilers.Compiler | None = None, optimise: tuple[str, ...] = FAST) -> OnlineSolver:
         """Return a fresh solver, whose memory a compiled flight may use."""
-        return OnlineSolver(self.problem, compiler=compiler)
+        return OnlineSolver(self.problem, compiler=compiler, optimise=optimise)
 
-    def start(self) -> Allocate:
+    def start(self, optimise: tuple[str, ...] = FAST) -> Allocate:
         """Return the function of one flight: the same compiled solver, called from Python.
 
         Without a compiler the cone solver takes its place; its forces differ within both gaps.
         """
         try:
-            solver = self.solver()
+            solver = self.solver(optimise=optimise)
         except NoCompilerError:
             return SolverInFlight(self.problem, "clarabel").start()
 

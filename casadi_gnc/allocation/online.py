@@ -18,6 +18,8 @@ from casadi_gnc.system import assets, compilers
 
 #: Flags with which gcc vectorises it; the words stay the same.
 FAST = ("-O3", "-fno-math-errno", "-fno-trapping-math")
+#: For a handful of solves: compiling counts, not their time. The words are the same.
+BRIEF = ("-O0",)
 #: Largest sizes it is written for: actuators, rows of effort, rows of coupling, vertices.
 LARGEST = (64, 6, 8, 64)
 
@@ -72,6 +74,8 @@ class OnlineSolver:
     problem : what stays the same.
     tolerance : relative duality gap at which an iteration ends; 0 means 1e-8.
     interior_point_only : use the base method alone.
+    compiler : the one found first by default.
+    optimise : the compiler's flags.
 
     Raises
     ------
@@ -86,6 +90,7 @@ class OnlineSolver:
         tolerance: float = 0.0,
         interior_point_only: bool = False,
         compiler: compilers.Compiler | None = None,
+        optimise: tuple[str, ...] = FAST,
     ) -> None:
         self._sizes, self._method = sizes(problem), int(interior_point_only)
         codegen = assets.folder("codegen")
@@ -93,7 +98,7 @@ class OnlineSolver:
         c = compilers.load(
             source,
             include=codegen / "runtime",
-            flags=(*FAST, *flags(problem)),
+            flags=(*optimise, *flags(problem)),
             units=units(),
             compiler=compiler,
         )

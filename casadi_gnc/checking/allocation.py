@@ -8,11 +8,13 @@ negative real part turns a stabilising command into a destabilising one.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.allocation import PseudoInverse, leaves_none_out
+from casadi_gnc.allocation import OnlineInFlight, PseudoInverse, leaves_none_out
+from casadi_gnc.allocation.online import BRIEF
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.loop import Loop
 from casadi_gnc.missions.mission import Mission
@@ -81,12 +83,13 @@ def least_real_parts(mission: Mission, scheme: Scheme, slope: np.ndarray) -> dic
     }
 
 
+@lru_cache(maxsize=32)
 def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
-    """Return dF/du at rest, (N, R), by central differences of what flies.
+    """Return dF/du at rest, (N, R), by central differences of what flies; asked again, the same.
 
     Where the actuators leave an effort out there is no pseudo-inverse to fly; then that of least squares.
     """
-    actuation, count = scheme.actuation, mission.truth.inputs.size
+    actuation, allocator, count = scheme.actuation, scheme.actuation.allocator, mission.truth.inputs.size
     matrix = actuation.matrix(mission.truth.measurement.split(mission.first_measurement()))
     if isinstance(actuation.allocator, PseudoInverse) and not leaves_none_out(matrix):
         return np.linalg.pinv(np.array(ca.DM(matrix)))
@@ -101,7 +104,7 @@ def allocation_slope(mission: Mission, scheme: Scheme) -> np.ndarray:
         def allocate(u: np.ndarray) -> np.ndarray:
             return np.array(ca.DM(expression(y, u, rest, lower, upper)).full()).ravel()  # type: ignore[arg-type]
     else:
-        solve = scheme.actuation.allocator.start()
+        solve = allocator.start(BRIEF) if isinstance(allocator, OnlineInFlight) else allocator.start()
 
         def allocate(u: np.ndarray) -> np.ndarray:
             return np.array(solve(u, rest.copy(), lower, upper)[0])

@@ -146,7 +146,6 @@ def _needed_share(
 ) -> float:
     """Return the share for one believed effectiveness and one box; schemes often have the same."""
     from scipy import sparse  # a flight does without
-    from scipy.optimize import linprog
 
     matrix = np.frombuffer(data).reshape(shape)
     most_below, most_above, limit_below, limit_above = (np.array(each) for each in box)
@@ -174,19 +173,16 @@ def _needed_share(
     ]
     bounded: Any = sparse.vstack(inside)
     moving = [sparse.kron(second, sparse.identity(axes)), -(h**2) * sparse.kron(mean, gain)]
-    found = linprog(
+    bare = steps * count + 1
+    found = programs.least(
         np.r_[np.zeros(steps * (axes + count)), 1.0],
-        A_ub=sparse.hstack([sparse.csr_array((bounded.shape[0], steps * axes)), bounded], format="csr"),
-        b_ub=np.zeros(bounded.shape[0]),
-        A_eq=sparse.hstack([*moving, sparse.csr_array((steps * axes, 1))], format="csr"),
-        b_eq=known.ravel(),
-        bounds=[*zip(lower, upper, strict=True), *[(None, None)] * (steps * count), (0, None)],
-        method="highs",
-        options=programs.PATIENCE,
+        sparse.hstack([sparse.csr_array((bounded.shape[0], steps * axes)), bounded], format="csr"),
+        sparse.hstack([*moving, sparse.csr_array((steps * axes, 1))], format="csr"),
+        known.ravel(),
+        np.array([[*lower, *[-np.inf] * (bare - 1), 0.0], [*upper, *[np.inf] * bare]]),
     )
-    if found.status == programs.UNSOLVED:
-        return float("nan")  # nothing is known: no reason to fail
-    return float(found.x[-1]) if found.status == 0 else float("inf")
+    # NaN where nothing is known: no reason to fail.
+    return float("inf") if found is None else float(found[-1])
 
 
 def _second_order(mission: Mission, funnel: Funnel) -> tuple[np.ndarray, ...]:

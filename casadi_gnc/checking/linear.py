@@ -14,7 +14,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy import linalg
 
 from casadi_gnc.missions.linear_plant import rows_of, target_state, unlimited
 from casadi_gnc.missions.loop import Loop
@@ -169,6 +168,8 @@ class LinearLoop:
         if self.sampled:
             step, push = self.matrix, moved - np.concatenate([x0[rows], m0])
         else:
+            from scipy import linalg  # a sampled loop does without
+
             # exp of [[A, I], [0, 0]] h holds the exact step and the exact effect of a held push.
             joint = linalg.expm(h * np.block([[self.matrix, np.eye(size)], [np.zeros((size, 2 * size))]]))
             step, push = joint[:size, :size], moved @ joint[:size, size:].T
@@ -284,8 +285,9 @@ def moving_rows(matrix: np.ndarray, sampled: bool) -> np.ndarray:
     return np.any(~np.isclose(matrix, still, rtol=0.0, atol=1e-12), axis=1) if matrix.size else np.zeros(0, dtype=bool)
 
 
+@lru_cache(maxsize=_KEPT)
 def command_slope(mission: Mission, scheme: Scheme) -> tuple[np.ndarray, np.ndarray]:
-    """Return d(command)/d(measurement) at the target at the end of the flight, and that measurement."""
+    """Return d(command)/d(measurement) at the target at the end of the flight, and that measurement; kept."""
     loop, seen = Loop(mission, scheme), mission.truth.measurement.symbol("y")
     y = ca.DM(mission.truth.measure(0.0, ca.DM(target_state(mission)), mission.quiet()))
     memory = ca.DM(loop.started(ca.DM(0.0), y))

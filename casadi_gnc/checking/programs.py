@@ -1,10 +1,12 @@
 """Linear programs of one shape that differ in their data, solved as one: the set-up of each costs more than it does.
 
-SciPy's programs are imported where they are solved: a flight does without.
+Clarabel's interior point takes them, to ten digits. Where it does not end well, and of programs without an answer,
+SciPy's simplex has the word: importing it takes longer than a check does.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -13,8 +15,69 @@ import numpy as np
 _MOST = 1e6
 #: Where a program counts as unsolved, for numbers hundreds of decades apart may never end: by iterations, so that what
 #: is found is the same on a busy machine, and by seconds where not even one ends.
-PATIENCE = {"maxiter": 50_000, "time_limit": 15.0}
-UNSOLVED = 1
+_PATIENCE = {"maxiter": 50_000, "time_limit": 15.0}
+_UNSOLVED = 1
+#: Gap and feasibility that Clarabel is asked for.
+_TOLERANCE = 1e-10
+#: Digits of a share, after the point and in all, beyond which it is that tolerance's rounding.
+_DIGITS = 9
+
+
+def least(
+    cost: np.ndarray, inequalities: Any, equalities: Any, known: np.ndarray, box: np.ndarray
+) -> np.ndarray | None:
+    """Return x of the least cost.x with A x <= 0, E x = e and bounds; None if there is none, NaN if not solved.
+
+    Parameters
+    ----------
+    cost : (n,).
+    inequalities, equalities : A, E, sparse; (M, n), (K, n).
+    known : e, (K,).
+    box : least and largest x, (2, n); infinite where there is no bound.
+    """
+    found = _interior_point(cost, inequalities, equalities, known, box)
+    return _simplex(cost, inequalities, equalities, known, box) if found is None else found
+
+
+def _interior_point(
+    cost: np.ndarray, inequalities: Any, equalities: Any, known: np.ndarray, box: np.ndarray
+) -> np.ndarray | None:
+    """Return Clarabel's answer; None where it is not sure of one."""
+    from scipy import sparse
+
+    clarabel: Any = import_module("clarabel")  # it tells type checkers nothing
+    lower, upper = np.isfinite(box)
+    eye: Any = sparse.identity(cost.size, format="csr")
+    rows = sparse.vstack([equalities, inequalities, -eye[lower], eye[upper]], format="csc")
+    right = np.r_[known, np.zeros(inequalities.shape[0]), -box[0][lower], box[1][upper]]
+    settings = clarabel.DefaultSettings()
+    settings.verbose, settings.time_limit = False, _PATIENCE["time_limit"]
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = _TOLERANCE
+    cones = [clarabel.ZeroConeT(known.size), clarabel.NonnegativeConeT(right.size - known.size)]
+    none = sparse.csc_matrix((cost.size, cost.size))
+    if not (np.isfinite(rows.data).all() and np.isfinite(right).all()):
+        return None
+    solution = clarabel.DefaultSolver(none, cost, rows, right, cones, settings).solve()
+    return np.array(solution.x) if str(solution.status) == "Solved" else None
+
+
+def _simplex(
+    cost: np.ndarray, inequalities: Any, equalities: Any, known: np.ndarray, box: np.ndarray
+) -> np.ndarray | None:
+    from scipy.optimize import linprog
+
+    found = linprog(
+        cost,
+        A_ub=inequalities,
+        b_ub=np.zeros(inequalities.shape[0]),
+        A_eq=equalities,
+        b_eq=known,
+        bounds=box.T,
+        options=_PATIENCE,
+    )
+    if found.status == _UNSOLVED:
+        return np.full(cost.size, np.nan)
+    return np.array(found.x) if found.status == 0 else None
 
 
 def largest_shares(matrix: np.ndarray, wanted: np.ndarray, lower: Any, upper: Any) -> np.ndarray:
@@ -29,24 +92,21 @@ def largest_shares(matrix: np.ndarray, wanted: np.ndarray, lower: Any, upper: An
     lower, upper : bounds of F, (N,).
     """
     from scipy import sparse
-    from scipy.optimize import linprog
 
     count, n = len(wanted), matrix.shape[1]
     # Rows in their own units: arms of kilometres beside centimetres are no reason to fail.
     reach = _units(np.abs(matrix) @ np.maximum(np.abs(np.array(lower)), np.abs(np.array(upper))))
     matrix, wanted = matrix / reach[:, None], wanted / reach
     parts = [sparse.kron(sparse.identity(count), matrix), sparse.block_diag([-effort[:, None] for effort in wanted])]
-    found = linprog(
+    found = least(
         np.r_[np.zeros(count * n), -np.ones(count)],
-        A_eq=sparse.hstack(parts, format="csr"),
-        b_eq=np.zeros(wanted.size),
-        bounds=[*zip(lower, upper, strict=True)] * count + [(0, _MOST)] * count,
-        options=PATIENCE,
+        sparse.csr_array((0, count * (n + 1))),
+        sparse.hstack(parts, format="csr"),
+        np.zeros(wanted.size),
+        np.array([[*lower] * count + [0.0] * count, [*upper] * count + [_MOST] * count]),
     )
-    if found.status == 0:
-        return np.array(found.x)[count * n :]
-    if found.status == UNSOLVED:
-        return np.full(count, np.nan)
+    if found is not None:
+        return _shares(found[count * n :])
     # One that has no answer leaves all without one.
     return np.zeros(1) if count == 1 else np.hstack([largest_shares(matrix, w[None], lower, upper) for w in wanted])
 
@@ -62,29 +122,29 @@ def least_shares(bounds: np.ndarray, gain: np.ndarray, load: np.ndarray) -> np.n
     gain, load : G, (K, n, N), and d, (K, n).
     """
     from scipy import sparse
-    from scipy.optimize import linprog
 
     count, n = len(gain), gain.shape[2]
     bounds = bounds / _units(np.abs(bounds).max(axis=1))[:, None]
     size = _units(np.abs(gain).max(axis=2))
     gain, load = gain / size[:, :, None], load / size
     eye = sparse.identity(count)
-    found = linprog(
+    found = least(
         np.r_[np.zeros(count * n), np.ones(count)],
-        A_ub=sparse.hstack([sparse.kron(eye, bounds[:, :n]), sparse.kron(eye, bounds[:, n:])], format="csr"),
-        b_ub=np.zeros(count * len(bounds)),
-        A_eq=sparse.hstack([sparse.block_diag(list(gain)), sparse.csr_array((load.size, count))], format="csr"),
-        b_eq=-load.ravel(),
-        bounds=[(None, None)] * (count * n) + [(0, None)] * count,
-        options=PATIENCE,
+        sparse.hstack([sparse.kron(eye, bounds[:, :n]), sparse.kron(eye, bounds[:, n:])], format="csr"),
+        sparse.hstack([sparse.block_diag(list(gain)), sparse.csr_array((load.size, count))], format="csr"),
+        -load.ravel(),
+        np.array([[-np.inf] * (count * n) + [0.0] * count, [np.inf] * (count * (n + 1))]),
     )
-    if found.status == 0:
-        return np.array(found.x)[count * n :]
-    if found.status == UNSOLVED:
-        return np.full(count, np.nan)
+    if found is not None:
+        return _shares(found[count * n :])
     if count == 1:
         return np.array([np.inf])
     return np.hstack([least_shares(bounds, g[None], d[None]) for g, d in zip(gain, load, strict=True)])
+
+
+def _shares(found: np.ndarray) -> np.ndarray:
+    """Return shares without the digits that are rounding: one that is 1 counts as 1."""
+    return np.array([float(f"{round(float(share), _DIGITS):.{_DIGITS}g}") for share in found])
 
 
 def _units(sizes: np.ndarray) -> np.ndarray:

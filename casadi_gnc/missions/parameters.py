@@ -8,6 +8,7 @@ library, for all their values; what follows from them alone is computed once a f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +18,6 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc import guests
-from casadi_gnc.embedded.printer import print_function
 from casadi_gnc.errors import AllocationError, FlightError, GncError, LawError
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.missions.actuation import SET_UP, Actuation
@@ -175,7 +175,7 @@ def _varied(mission: Mission, keys: Sequence[str]) -> Varied:
         varied = _with(mission, dict(zip(keys, symbols, strict=True)))
         made = Varied(mission, varied, Parameters(tuple(keys), column, nominal))
         for tape in made.tapes.functions.values():
-            print_function(tape)  # a symbol that Python took for a number is NaN, which has no C form
+            _refuse_nan(tape)
     except LawError as error:
         raise _said(error) from error
     except (RuntimeError, TypeError, ValueError, NotImplementedError) as error:  # what CasADi and Python say of that
@@ -184,6 +184,13 @@ def _varied(mission: Mission, keys: Sequence[str]) -> Varied:
     if _shape(made.mission, made.scheme) != _shape(mission, made.nominal.schemes[0]):
         raise FlightError("where it is not zero the flight has other signals or steps; write a nominal value above 0")
     return made
+
+
+def _refuse_nan(tape: ca.Function) -> None:
+    """Raise ValueError for a constant without a C form, not finite: a symbol that Python took for a number."""
+    for k in range(tape.n_instructions()):
+        if tape.instruction_id(k) == ca.OP_CONST and not math.isfinite(tape.instruction_constant(k)):
+            raise ValueError("Python took a symbol for a number")
 
 
 def _shape(mission: Mission, scheme: Scheme) -> list[tuple[Any, Any]]:

@@ -9,7 +9,6 @@ from casadi_gnc.checking import check
 from casadi_gnc.checks import Check
 from casadi_gnc.errors import ProblemError
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.problem_files import synthesis_checks
 from casadi_gnc.problem_files.boundary import about
 from casadi_gnc.problem_files.document import read
 from casadi_gnc.problem_files.loading import load_document
@@ -43,6 +42,8 @@ def checked_file(problem: str | Path, schemes: list[str] | None = None) -> Check
     kind = document.data.get("kind")
     with about(document):
         if kind == "synthesis":
+            from casadi_gnc.problem_files import synthesis_checks  # solvers that a mission does without
+
             return Checked(*synthesis_checks.check(problem))
         if kind != "mission":
             message = f'kind is {shown(kind)}; check takes a file of kind "mission" or "synthesis"'

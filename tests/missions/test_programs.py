@@ -21,7 +21,7 @@ def test_largest_shares_are_those_of_single_programs(rng, always_on):
             b_eq=np.zeros(3),
             bounds=[*zip(lower, upper, strict=True), (0, None)],
         )
-        assert share == pytest.approx(found.x[-1] if found.status == 0 else 0.0, rel=1e-9)
+        assert share == pytest.approx(found.x[-1] if found.status == 0 else 0.0, rel=1e-8)
 
 
 def test_an_effort_that_cannot_be_made_takes_no_share_from_others():
@@ -29,7 +29,7 @@ def test_an_effort_that_cannot_be_made_takes_no_share_from_others():
     matrix = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     wanted = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.8]])
     shares = largest_shares(matrix, wanted, [0.0, 0.0, -1.0], [1.0, 1.0, 1.0])
-    assert shares == pytest.approx([2.0, 0.0, 1.0, 1.25], abs=1e-12)
+    assert shares == pytest.approx([2.0, 0.0, 1.0, 1.25], abs=1e-9)
     # One that is always on leaves 1 N along the first axis to every effort across, which nothing cancels.
     assert largest_shares(matrix, wanted, [1.0, 0.0, -1.0], [1.0, 1.0, 1.0]) == pytest.approx([2.0, 0.0, 0.0, 1.25])
 
@@ -39,9 +39,9 @@ def test_least_shares_are_loads_over_what_there_is():
     bounds = np.array([[1.0, 0, -2], [-1, 0, -2], [0, 1, -1], [0, -1, -1]])
     loads = np.array([[0.3], [-1.5], [0.0], [6.0]])
     gain = np.ones((4, 1, 2))
-    assert least_shares(bounds, gain, loads) == pytest.approx(np.abs(loads.ravel()) / 3, abs=1e-12)
+    assert least_shares(bounds, gain, loads) == pytest.approx(np.abs(loads.ravel()) / 3, abs=1e-9)
     gain[3] = 0.0
-    assert least_shares(bounds, gain, loads) == pytest.approx([0.1, 0.5, 0.0, np.inf], abs=1e-12)
+    assert least_shares(bounds, gain, loads) == pytest.approx([0.1, 0.5, 0.0, np.inf], abs=1e-9)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 64, 1001])
