@@ -14,6 +14,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy import linalg
 
 from casadi_gnc.missions.linear_plant import rows_of, target_state, unlimited
 from casadi_gnc.missions.loop import Loop
@@ -168,8 +169,6 @@ class LinearLoop:
         if self.sampled:
             step, push = self.matrix, moved - np.concatenate([x0[rows], m0])
         else:
-            from scipy import linalg  # a sampled loop does without
-
             # exp of [[A, I], [0, 0]] h holds the exact step and the exact effect of a held push.
             joint = linalg.expm(h * np.block([[self.matrix, np.eye(size)], [np.zeros((size, 2 * size))]]))
             step, push = joint[:size, :size], moved @ joint[:size, size:].T

@@ -43,7 +43,8 @@ class Slow:
         S, K = np.diag(self.units), B.T @ P
         self.A, self.B, self.E = S @ A / self.units, S @ B, S @ E
         self.C, self.D, self.K = C / self.units, D, K / self.units
-        self.gamma, self.wide = 1.1 * h_infinity_norm(A - B @ K, E, C - D @ K).upper, 1.1 * gamma
+        self.gamma = float(1.1 * h_infinity_norm(A - B @ K, E, C - D @ K).upper)
+        self.wide = float(1.1 * gamma)
 
 
 def state(p, **options):
