@@ -430,15 +430,16 @@ def finished(out):
     return len(list(out.glob("shard-*.json")))
 
 
-def moment(out, process, shards, rng):
-    """Wait for a random moment: while the program begins, or soon after some more shards are written."""
-    if rng.random() < 0.2:
+def moment_comes(out, process, shards, rng):
+    """Wait for a random moment: while the program begins, or soon after some more shards are written, if there are."""
+    if rng.random() < 0.1:
         time.sleep(rng.uniform(0.0, 2.0))
-        return
-    asked = rng.randint(min(finished(out) + 1, shards), shards)
-    while finished(out) < asked and process.poll() is None:
+        return True
+    asked = finished(out) + rng.randint(1, shards // 4)
+    while finished(out) < min(asked, shards) and process.poll() is None:
         time.sleep(0.002)
     time.sleep(rng.uniform(0.0, 0.02))
+    return asked <= shards
 
 
 def killed(problem, out, calm, kills, rng):
@@ -449,8 +450,7 @@ def killed(problem, out, calm, kills, rng):
     shards, halfway, left, ended = finished(calm), 0, kills, 0
     while left or not ended:
         process = subprocess.Popen(in_small_shards(problem, out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        if left:
-            moment(out, process, shards, rng)
+        if left and moment_comes(out, process, shards, rng):
             process.kill()
         if process.wait() == -signal.SIGKILL:
             left -= 1
