@@ -140,8 +140,8 @@ static int follow_sets(workspace_t *work, const data_t *data, const command_t *c
 }
 
 /* Rounding of the residuals may have ended the path above what is called close: then what it found is evaluated with
- * twice the digits. Where that is not good, or the path did not arrive, the interior point begins anew. */
-static void solve_anew(workspace_t *work, const data_t *data, command_t *command, point_t *point, int found,
+ * twice the digits. Where that is not good, or the path did not arrive, the interior point goes on near where it ended. */
+static void go_on_inside(workspace_t *work, const data_t *data, command_t *command, point_t *point, int found,
                        int32_t *iterations)
 {
     real gap = -1;
@@ -154,7 +154,7 @@ static void solve_anew(workspace_t *work, const data_t *data, command_t *command
     (void)memcpy(work->force_change, work->force, sizeof work->force);
     (void)memcpy(work->lambda_change, work->lambda, sizeof work->lambda);
     if (!(found && is_optimal(data, point))) {
-        NAME(interior_point)(work, data, command, point, iterations);
+        NAME(interior_point)(work, data, command, point, 1, iterations);
     }
     if (found && !(point->gap <= gap)) {
         (void)memcpy(work->force, work->force_change, sizeof work->force);
@@ -179,7 +179,7 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
 {
     command_t command;
     point_t point;
-    int certified = 0, follow;
+    int follow;
     const real *held = previous;
     point.gap = 0; /* nothing has been found */
     point.phi = 0;
@@ -203,11 +203,15 @@ static int32_t solve_by(int fast, workspace_t *work, const data_t *data, const r
     follow = fast != 0 && (data->regularised == 0 || data->distinct == 1);
     if (follow != 0) {
         result->path = GNC_ALLOC_PATH_ACTIVE_SET;
-        certified = follow_sets(work, data, &command, &point, &result->active_set_iterations);
-    }
-    if (!certified || !(point.gap <= (real)CLOSE * point.phi)) {
+        const int certified = follow_sets(work, data, &command, &point, &result->active_set_iterations);
+        if (!certified || !(point.gap <= (real)CLOSE * point.phi)) {
+            result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
+            go_on_inside(work, data, &command, &point, certified, &result->interior_point_iterations);
+        }
+    } else {
         result->path = GNC_ALLOC_PATH_INTERIOR_POINT;
-        solve_anew(work, data, &command, &point, certified, &result->interior_point_iterations);
+        work->smooth = 0;
+        NAME(interior_point)(work, data, &command, &point, 0, &result->interior_point_iterations);
     }
     if (!report(data, &command, lower, upper, work, &point, result)) { /* overflow: numbers too large */
         forget(work);

@@ -13,16 +13,22 @@
  */
 #include "gnc_allocate_internal.h"
 
-enum { MAX_STEPS = 34 };
+enum {
+    MAX_STEPS = 34,     /* from the middle of the box */
+    MAX_STEPS_NEAR = 22 /* from where the path ended */
+};
+#define INSIDE (real)0.02 /* of the box: so far from its bounds the iteration begins */
 #define NEAR_ROUNDING (real)16 /* of the gap that rounding explains: from there on residuals get twice the digits */
 #define SHORT_STEP (real)0.1 /* a step this short did not pay: centre next */
-#define BACK_OFF (real)0.98  /* go this far towards the nearest boundary; 0.995 saves half an iteration in
-                              * easy problems and loses the way in degenerate ones */
+/* go this far towards the nearest boundary: 0.995 throughout loses the way in degenerate problems, but where the
+ * predictor takes next to all of the products away, the corrector may follow it */
+#define BACK_OFF (real)0.98
+#define BACK_OFF_LESS (real)0.999
 
 /* ---- one step ---------------------------------------------------------------------------------- */
 
-/* Longest step, at most 1, that keeps a little of every room and multiplier. */
-static real step_length(const direction_t *dir, const iterate_t *it)
+/* Longest step, at most 1, that goes this part of the way to where a room or multiplier ends. */
+static real step_length(const direction_t *dir, const iterate_t *it, real part)
 {
     int i, v;
     real ratio = 0;
@@ -36,7 +42,7 @@ static real step_length(const direction_t *dir, const iterate_t *it)
         const real root = SQUARE_ROOT(dir->rise[v] * dir->rise[v] + 4 * it->s[v] * dir->bend[v]);
         ratio = larger(ratio, larger(-dir->lambda[v] / it->lambda[v], (root - dir->rise[v]) / (2 * it->s[v])));
     }
-    return BACK_OFF < ratio ? BACK_OFF / ratio : 1;
+    return part < ratio ? part / ratio : 1;
 }
 
 /* Aim at equal products mu, less the cross terms that the last direction predicts if second_order is 1,
@@ -74,15 +80,17 @@ static real mean_product(const direction_t *dir, const iterate_t *it, real step,
 
 /* ---- the iteration ------------------------------------------------------------------------------ */
 
-/* Centre of the box, equal weights, equal products. */
-static int set_out(iterate_t *it, real *force, const data_t *data, const command_t *command, point_t *point)
+/* Equal weights, equal products; forces in the middle of the box, or those of the workspace, a little inside it. */
+static int set_out(iterate_t *it, real *force, const workspace_t *work, const data_t *data, const command_t *command,
+                   point_t *point, int near)
 {
     int i, v, products = V;
-    const real count = (real)(int)V;
+    const real count = (real)(int)V, inside = near != 0 ? INSIDE : (real)0.5;
     real mu = 0;
     for (i = 0; i < N; ++i) {
-        it->down[i] = (real)0.5 * (command->upper[i] - command->lower[i]);
-        it->up[i] = it->down[i];
+        const real width = command->upper[i] - command->lower[i], room = inside * width;
+        it->down[i] = smaller(larger(work->force[i] - command->lower[i], room), width - room);
+        it->up[i] = width - it->down[i];
         force[i] = command->lower[i] + it->down[i];
         if (command->dead[i] != 0) {
             force[i] = command->lower[i];
@@ -99,7 +107,7 @@ static int set_out(iterate_t *it, real *force, const data_t *data, const command
     }
     for (i = 0; i < N; ++i) {
         it->zl[i] = command->dead[i] != 0 ? 0 : mu / it->down[i];
-        it->zu[i] = it->zl[i];
+        it->zu[i] = command->dead[i] != 0 ? 0 : mu / it->up[i];
         products += command->dead[i] != 0 ? 0 : 2;
     }
     return products;
@@ -199,9 +207,10 @@ static void take_step(iterate_t *it, real *force, const direction_t *dir, const 
 }
 
 /* The direction towards a target, and how far it may be followed: 0 where it cannot be computed. */
-static real towards(direction_t *dir, factors_t *fac, const data_t *data, const iterate_t *it, const point_t *point)
+static real towards(direction_t *dir, factors_t *fac, const data_t *data, const iterate_t *it, const point_t *point,
+                    real part)
 {
-    return NAME(interior_direction)(dir, fac, data, it, point) ? step_length(dir, it) : 0;
+    return NAME(interior_direction)(dir, fac, data, it, point) ? step_length(dir, it, part) : 0;
 }
 
 /* A predictor and a corrector; after a round in which these led nowhere, a step back to the centre instead: no round
@@ -211,7 +220,7 @@ static int iterate(iterate_t *it, real *force, workspace_t *work, const data_t *
 {
     factors_t fac;
     direction_t dir;
-    real step;
+    real step, part = BACK_OFF;
     int v;
     fac.W = work->W;
     fac.L = work->L;
@@ -229,11 +238,12 @@ static int iterate(iterate_t *it, real *force, workspace_t *work, const data_t *
     if (it->astray != 0) {
         aim(&dir, command, it->mu, 0, 0);
     } else {
-        const real far = towards(&dir, &fac, data, it, point);
+        const real far = towards(&dir, &fac, data, it, point, 1);
         const real sigma = mean_product(&dir, it, far, products) / it->mu;
-        aim(&dir, command, sigma * sigma * sigma * it->mu, far, 1); /* corrector */
+        aim(&dir, command, sigma * sigma * it->mu, far, 1); /* corrector */
+        part = larger(BACK_OFF, smaller(BACK_OFF_LESS, 1 - sigma));
     }
-    step = towards(&dir, &fac, data, it, point);
+    step = towards(&dir, &fac, data, it, point, part);
     if (!GNC_ASSERT(step > 0)) {
         return 0;
     }
@@ -247,8 +257,9 @@ static int iterate(iterate_t *it, real *force, workspace_t *work, const data_t *
 }
 
 void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
-                          int32_t *iterations)
+                          int near, int32_t *iterations)
 {
+    const int most = near != 0 ? MAX_STEPS_NEAR : MAX_STEPS;
     iterate_t it;
     real force[N], best;
     int k, going;
@@ -256,7 +267,7 @@ void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *comm
     command->floor = NAME(floor_of)(data, command);
     it.astray = 0;
     work->stamp = 0; /* the factors of the sets make room */
-    products = set_out(&it, force, data, command, point);
+    products = set_out(&it, force, work, data, command, point, near);
     rest(work, data, command, it.lambda, point);
     best = point->gap;
     going = !is_optimal(data, point);
@@ -271,7 +282,7 @@ void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *comm
         }
         going = !is_optimal(data, point) && is_finite(point->gap);
         command->careful = point->gap <= NEAR_ROUNDING * command->floor ? 1 : command->careful;
-        if (going && k < MAX_STEPS) {
+        if (going && k < most) {
             going = iterate(&it, force, work, data, command, point, products);
         } else {
             going = 0;

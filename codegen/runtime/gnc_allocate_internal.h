@@ -39,6 +39,7 @@ enum {
     V = GNC_ALLOC_V,                        /* vertices */
     K = GNC_ALLOC_K,                        /* rows of S */
     KT = GNC_ALLOC_TRIANGLE(GNC_ALLOC_K),   /* entries of a lower triangle, packed by rows */
+    PT = GNC_ALLOC_TRIANGLE(GNC_ALLOC_P),
     A = K + 2,                              /* more active vertices are always dependent */
     READY = 0x5EA1,                         /* mark of data that the set-up has filled */
     NOTHING = -1,                           /* no obstacle; else actuator i is i and vertex v is N + v */
@@ -233,10 +234,11 @@ void NAME(predict)(workspace_t *work, last_t *last, const command_t *command);
 void NAME(remember)(workspace_t *work, const last_t *last);
 
 /* gnc_allocate_interior_point.c, gnc_allocate_active_set.c: the point belongs to the answer in the workspace. The
- * former leaves the best of its iterates and switches the command to careful where it must; the latter, from the last
+ * former begins in the middle of the box or near the forces of the workspace, leaves the best of its iterates and
+ * switches the command to careful where it must; the latter, from the last
  * answer or from none, return 1 if theirs is certified, or as far as rounding lets it be, and add up iterations. */
 void NAME(interior_point)(workspace_t *work, const data_t *data, command_t *command, point_t *point,
-                          int32_t *iterations);
+                          int near, int32_t *iterations);
 int NAME(is_there)(const workspace_t *work, const data_t *data, const command_t *command, const point_t *point,
                    real last_gap);
 int NAME(from_last)(workspace_t *work, const data_t *data, const command_t *command, point_t *point,

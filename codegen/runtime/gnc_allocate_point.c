@@ -201,24 +201,30 @@ real NAME(floor_of)(const data_t *data, const command_t *command)
 /* W = sum lambda_v [I D_v]'[I D_v], the curvature of the lambda-weighted function in y. */
 int NAME(curvature_in_y)(const data_t *data, const real *lambda, real (*W)[K])
 {
-    int k, l, v;
-    real sum = 0;
+    int k, l, v, e = 0;
+    real sum = 0, packed[GNC_ALLOC_AT_LEAST_1(PT)] = {0};
     for (k = 0; k < K; ++k) {
         set_zero(W[k]);
     }
     for (v = 0; v < V; ++v) {
         if (lambda[v] > 0) {
-            int e = 0;
             sum += lambda[v];
             for (k = 0; k < P; ++k) {
+                UNROLLED
                 for (l = 0; l < R; ++l) {
                     W[R + k][l] += lambda[v] * data->Dv[v][l][k];
                 }
-                for (l = 0; l <= k; ++l) {
-                    W[R + k][R + l] += lambda[v] * data->DD[v][e];
-                    ++e;
-                }
             }
+            UNROLLED
+            for (l = 0; l < PT; ++l) {
+                packed[l] += lambda[v] * data->DD[v][l];
+            }
+        }
+    }
+    for (k = 0; k < P; ++k) {
+        for (l = 0; l <= k; ++l) {
+            W[R + k][R + l] = packed[e];
+            ++e;
         }
     }
     for (k = 0; k < R; ++k) {

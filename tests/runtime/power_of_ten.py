@@ -15,7 +15,7 @@ from c_sources import FILES, MATHS, UNITS, Finding, Function, functions, judge
 MOST_LINES = 60
 SHORT = 10  # lines of a function that needs no assertion
 DENSITY = 0.02  # assertions a line of code of the allocator
-CONSTANT = r"(?:N|R|P|P1|V|K|KT|A|MAX_\w+|\d+[uU]?)"
+CONSTANT = r"(?:N|R|P|P1|V|K|KT|PT|A|MAX_\w+|\d+[uU]?)"
 ARITHMETIC = re.compile(rf"^[\s()]*{CONSTANT}(?:[\s()]*[-+*][\s()]*{CONSTANT})*[\s()]*$")
 
 
