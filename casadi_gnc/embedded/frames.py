@@ -11,6 +11,7 @@ from typing import Any
 
 from casadi_gnc.embedded import packets
 from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.deviations import DEVIATIONS, deviations
 from casadi_gnc.embedded.dictionary import DICTIONARY, Dictionary
 from casadi_gnc.embedded.packable import Packable
 from casadi_gnc.errors import PackageError
@@ -60,7 +61,7 @@ FRAMES = {
 
 
 def package_files(thing: Packable, options: Options) -> dict[str, str]:
-    """Return all that a package has before its vectors: what flies, its dictionary, its frame.
+    """Return all that a package has before its vectors: what flies, its dictionary and deviations, its frame.
 
     Raises
     ------
@@ -69,6 +70,7 @@ def package_files(thing: Packable, options: Options) -> dict[str, str]:
     """
     about = thing.dictionary(options)
     files = {**thing.files(options), DICTIONARY: about.text()}
+    files[DEVIATIONS] = deviations(options.name, list(files))
     return files | (frame_files(options.frame, about, sorted(files)) if options.frame else {})
 
 
