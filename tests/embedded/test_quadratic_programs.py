@@ -121,7 +121,7 @@ def refused() -> dict[str, tuple[ca.Function, str]]:
             r"of 12 unknowns whose matrix is of another form, expected .* H = diag\(d\) \+ B'B",
         ),
         "lopsided": (outer(conic(2)(h=ca.DM([[3, 1], [0, 3]]), g=g)["x"]), "matrix is not symmetric"),
-        "large": (outer(conic(33)(h=ca.DM.eye(33), g=ca.repmat(g[0], 33))["x"]), "of 33 unknowns, expected 1 to 32"),
+        "large": (outer(conic(65)(h=ca.DM.eye(65), g=ca.repmat(g[0], 65))["x"]), "of 65 unknowns, expected 1 to 64"),
         "itself": (alone, r"alone is a quadratic program itself, whose result lam_p is no number; make a function"),
         "bare": (conic(2), "solver is of kind Qrqp, .* call it in a function of its own"),
         "map": (outer(conic(2).map(2)(h=ca.DM.eye(2), g=ca.horzcat(g, g))["x"]), "solver is of kind Qrqp"),
