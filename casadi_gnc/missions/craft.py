@@ -31,6 +31,7 @@ from casadi_gnc.tables.part import MisfitError, Part, Positive, plain
 if TYPE_CHECKING:
     from casadi_gnc.missions.mission import Mission
     from casadi_gnc.missions.scheme import Scheme
+    from casadi_gnc.missions.timing import Timing
 
 
 class EffortKeys(Part):
@@ -170,6 +171,15 @@ class Craft(Part):
 
     def flaws(self) -> Iterable[MisfitError]:
         """Yield what keeps the craft from flying at all, with the path of the key; `check` says more of it."""
+        return ()
+
+    def untimely(self, timing: Timing) -> Iterable[MisfitError]:
+        """Yield what does not fit the times of a flight, with the path of the key.
+
+        Parameters
+        ----------
+        timing : of the flight; a sensor that is faster than its samples does not fit.
+        """
         return ()
 
     def notes(self) -> Sequence[str]:

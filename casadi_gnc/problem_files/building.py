@@ -50,6 +50,8 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
         complaints.add(misfit.path, str(misfit))
     timing = _timing(common.timing)
+    for misfit in craft.untimely(timing):
+        complaints.add(misfit.path, str(misfit))
     funnels = []
     for i, table in enumerate(common.funnel):
         with complaints.about("funnel", i):

@@ -98,6 +98,15 @@ def test_sensors_and_the_timing_of_a_mission(change, told):
     assert told in str(raised.value)
 
 
+def test_sensors_that_are_too_fast_are_told_at_their_lines_with_what_else_is_wrong():
+    with pytest.raises(GncError) as raised:
+        casadi_gnc.load("satellites/earth_pointing", {"sensor.1.period_s": 0.03, "noise.period_s": 0.07})
+    told = str(raised.value)
+    assert "sensor[1].period_s" in told
+    assert "gyro: a value every 0.03 s, expected a whole multiple" in told
+    assert "period_s is 0.07" in told
+
+
 def test_a_table_that_a_file_gives_is_followed():
     """Attitudes by the minute: the flight's last one is the table's."""
     rows = [[np.cos(a), 0.0, np.sin(a), 0.0] for a in (0.0, 0.1, 0.2, 0.25)]

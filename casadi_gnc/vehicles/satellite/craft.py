@@ -33,6 +33,7 @@ from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.parts import Parts
 from casadi_gnc.missions.scene import Arrow, Direction, Jets, Scene, Spinners, Track
 from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.missions.timing import Timing
 from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
 from casadi_gnc.signals import Layout
 from casadi_gnc.tables import matrices
@@ -287,6 +288,18 @@ class SatelliteCraft(Craft):
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether wheels and thrusters leave an axis out."""
         return actuating.flaws(self, self.actuators())
+
+    def untimely(self, timing: Timing) -> Iterator[MisfitError]:
+        """Yield sensors that do not fit the sample period, or have no samples."""
+        for i, sensor in enumerate(self._sensors()):
+            if timing.mode != "sampled":
+                told = f"{sensor.name} is a sensor that is sampled; fly in mode sampled"
+                yield MisfitError(told, "sensor", i, "kind")
+                continue
+            try:
+                replace(sensor, hold=timing.sample_period)
+            except FlightError as error:
+                yield MisfitError(str(error), "sensor", i, "period_s")
 
     def regulated(self, mission: Mission) -> dict[str, list[float]]:
         """Return the attitude of a reference that stays, and rest; of one that moves, nothing."""
