@@ -8,10 +8,15 @@ d(t)        torque from outside on the reference, (3,), [N m]
 G, J_s, Om  axes of the wheels, (3, N), their inertias and speeds, (N,)
 f(Om)       friction of the wheels, (N,), [N m]
 s           G J_s Om, (3,), [N m s]: what the wheels store
-k           rate at which it is unloaded, [1/s]
+n           what motions that turn nothing store, (N,), [N m s]: G n = 0
+k, k_n, n_0 rates at which s is unloaded and n comes to n_0, of the rest speeds, [1/s]; 0 without [momentum]
 ==========  ==============================================================================================
 
 On the reference s' = d - k s in inertial axes, from the momentum of the start less that of the body on the reference.
+Motors share a torque out by the pseudo-inverse, so friction alone, and what [momentum] adds, changes the rest:
+
+    J_s Om = G+ s + n,    n' = -(I - G+ G) (f(Om) + k_n (n - n_0)).
+
 Motors make up for friction, so the body feels G f(Om), and a law that knows of neither holds the attitude at the angle
 
     4 |T (d + G f(Om))|, small as it has to be.
@@ -91,21 +96,43 @@ def torque_at_the_end(craft: SatelliteCraft, mission: Mission) -> np.ndarray:
 
 
 def friction_after(craft: SatelliteCraft, times: np.ndarray) -> np.ndarray:
-    """Return G f(Om), (3,), [N m], at the last of `times`, which begin at 0; wheels come to their own speeds."""
-    wheels, keys, remaining = part_tables.wheels(craft.wheel), craft.momentum, times[-1] - times
+    """Return G f(Om), (3,), [N m], at the last of `times`, which begin at 0."""
+    wheels, keys = part_tables.wheels(craft.wheel), craft.momentum
+    axes, spin = (np.array(ca.DM(each)) for each in (wheels.axes, wheels.spin_inertia))
+    spin, back = spin.ravel(), np.linalg.pinv(axes)
+    speed = ca.SX.sym("speed", len(spin))
+    friction = ca.Function("friction", [speed], [wheels.friction(speed)])
+    first = np.array(craft.start()["wheel_speed"], dtype=float)
+    shared, turnless = back @ _stored(craft, times), np.eye(len(spin)) - back @ axes
+    rest = turnless @ (spin * np.array(keys.rest_speeds_rad_per_s or np.zeros(len(spin))))
+
+    def slowed(t: float, n: np.ndarray) -> np.ndarray:
+        along = np.array([np.interp(t, times, each) for each in shared])
+        return -turnless @ (np.array(friction((along + n) / spin)).ravel() + keys.null_per_s * (n - rest))
+
+    n = turnless @ (spin * first)
+    if np.abs(turnless).max() > 1e-9:
+        from scipy.integrate import solve_ivp  # a flight does without
+
+        size = np.abs(shared).max() + np.abs(n).max() + np.abs(rest).max()
+        n = solve_ivp(slowed, (0.0, times[-1]), n, method="LSODA", rtol=1e-4, atol=1e-6 * size + 1e-300).y[:, -1]
+    return axes @ np.array(friction((shared[:, -1] + n) / spin)).ravel()
+
+
+def _stored(craft: SatelliteCraft, times: np.ndarray) -> np.ndarray:
+    """Return what the wheels store along the reference, (3, K), [N m s], body axes."""
+    wheels = part_tables.wheels(craft.wheel)
+    start = {name: np.array(value, dtype=float) for name, value in craft.start().items()}
     axes = np.array(ca.DM(wheels.axes))
     store = axes * np.array(ca.DM(wheels.spin_inertia)).ravel()
     inertia = np.array(ca.DM(craft.belief().inertia)) + store @ axes.T
-    start = {name: np.array(value) for name, value in craft.start().items()}
     first = np.array(quaternions.dcm(quaternions.from_mrp(ca.DM(start["mrp"]))))
-    torques, attitudes, rates = on_reference(craft, times)
     whole = first.T @ (inertia @ start["rate"] + store @ start["wheel_speed"])
-    # s' = d - k s in inertial axes, by the trapezoidal rule.
-    kept = np.exp(-keys.unload_per_s * remaining)[:, None]
-    pushed = np.einsum("kij,ki->kj", attitudes, torques) * kept
-    gained = (np.diff(times)[:, None] * (pushed[1:] + pushed[:-1]) / 2).sum(axis=0)
-    stored = attitudes[-1] @ ((whole - attitudes[0].T @ inertia @ rates[0]) * kept[0] + gained)
-    rest = np.array(keys.rest_speeds_rad_per_s or [0.0] * axes.shape[1])
-    idle = rest + (start["wheel_speed"] - rest) * math.exp(-keys.null_per_s * remaining[0])
-    speeds = idle + np.linalg.pinv(store) @ (stored - store @ idle)
-    return axes @ np.array(ca.DM(wheels.friction(ca.DM(speeds)))).ravel()
+    torques, attitudes, rates = on_reference(craft, times)
+    # By the trapezoidal rule, of s exp(k t).
+    grown = np.exp(craft.momentum.unload_per_s * (times - times[-1]))[:, None]
+    pushed = np.einsum("kij,ki->kj", attitudes, torques) * grown
+    gained = np.cumsum(np.diff(times)[:, None] * (pushed[1:] + pushed[:-1]) / 2, axis=0)
+    begun = (whole - attitudes[0].T @ inertia @ rates[0]) * grown[0]
+    stored = (begun + np.vstack([np.zeros(3), gained])) / grown
+    return np.einsum("kij,kj->ik", attitudes, stored)
