@@ -25,7 +25,7 @@
 #include "gnc_allocate_internal.h"
 
 enum {
-    MAX_PIECES = 8 + N, /* pieces and exchanges in all */
+    MAX_PIECES = 10 + N, /* pieces and exchanges in all */
     MAX_STUCK = 6        /* pieces of no length in a row: many obstacles at one point */
 };
 

@@ -15,9 +15,9 @@
 
 enum {
     MAX_STEPS = 34,     /* from the middle of the box */
-    MAX_STEPS_NEAR = 22 /* from where the path ended */
+    MAX_STEPS_NEAR = 26 /* from where the path ended */
 };
-#define INSIDE (real)0.02 /* of the box: so far from its bounds the iteration begins */
+#define INSIDE (real)0.05 /* of the box: so far from its bounds the iteration begins */
 #define NEAR_ROUNDING (real)16 /* of the gap that rounding explains: from there on residuals get twice the digits */
 #define SHORT_STEP (real)0.1 /* a step this short did not pay: centre next */
 /* go this far towards the nearest boundary: 0.995 throughout loses the way in degenerate problems, but where the

@@ -17,7 +17,7 @@
 #define NAME(word) GNC_ALLOC_NAME(word)
 typedef NAME(real) real;
 
-enum { N = GNC_ALLOC_N, R = GNC_ALLOC_R, P = GNC_ALLOC_P, V = GNC_ALLOC_V, MOST_ITERATIONS = 5 + 6 + 8 + N + 34 };
+enum { N = GNC_ALLOC_N, R = GNC_ALLOC_R, P = GNC_ALLOC_P, V = GNC_ALLOC_V, MOST_ITERATIONS = 5 + 6 + 10 + N + 34 };
 #ifdef GNC_ALLOC_REAL_FLOAT
 #define LARGEST 3.4e38F
 #define SMALLEST 1e-45F
