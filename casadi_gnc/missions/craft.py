@@ -173,12 +173,13 @@ class Craft(Part):
         """Yield what keeps the craft from flying at all, with the path of the key; `check` says more of it."""
         return ()
 
-    def untimely(self, timing: Timing) -> Iterable[MisfitError]:
+    def untimely(self, timing: Timing, *, strict: bool) -> Iterable[MisfitError]:
         """Yield what does not fit the times of a flight, with the path of the key.
 
         Parameters
         ----------
         timing : of the flight; a sensor that is faster than its samples does not fit.
+        strict : also what would fly, but not as meant: a mode that no sample can tell, a table that ends early.
         """
         return ()
 

@@ -50,7 +50,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
         complaints.add(misfit.path, str(misfit))
     timing = _timing(common.timing)
-    for misfit in craft.untimely(timing):
+    for misfit in craft.untimely(timing, strict=strict):
         complaints.add(misfit.path, str(misfit))
     funnels = []
     for i, table in enumerate(common.funnel):

@@ -68,6 +68,14 @@ WRONG = {
         "flexible_mode[1].damping: is 0.0, expected a number > 0",
     ),
     "undamped": (MODE.replace("damping = 0.01\n", ""), "flexible_mode[1].damping: is missing"),
+    "unseen": (
+        MODE.replace("frequency_Hz = 0.1", "frequency_Hz = 12.0"),
+        "flexible_mode[1].frequency_Hz: 12 Hz is above the sampling frequency, 10 Hz; sample faster",
+    ),
+    "short": (
+        '[[reference]]\nkind = "table"\ntimes_s = [0.0, 1.0]\nquaternions_scalar_first = [[1, 0, 0, 0], [1, 0, 0, 0]]',
+        "reference[1]: the table ends at 1 s and is needed until",
+    ),
     "heavy": (MODE.replace("[1.0, 0", "[5.0, 0"), "spacecraft: wheels and modes have more inertia about some axis"),
     "hinge": (
         PANEL.replace("[1.0, 0", "[1.0, 1"),

@@ -150,22 +150,27 @@ def _slews(craft: SatelliteCraft, axes: np.ndarray, torques: np.ndarray, stored:
                 )
 
 
-def _tables(craft: SatelliteCraft, mission: Mission) -> Iterator[Check]:
+def tables_of(craft: SatelliteCraft, duration: float) -> dict[int, tuple[float, float]]:
+    """Return of each reference that is a table, by its place, its last time and until when it is needed, [s]."""
     steps = _steps(craft)
-    ends = [*(start for start, _ in steps[1:]), mission.timing.duration]
-    for i, ((_, one), needed) in enumerate(zip(steps, ends, strict=True), 1):
-        if isinstance(one, Table):
-            yield Check(
-                f"geometry.reference_{i}_end",
-                float(one.times[-1]),
-                float(needed),
-                "s",
-                "fail",
-                f"The table of reference {i} ends before it is needed no more: the attitude stands from there on.",
-                "Give later rows, or another [[reference]] from then on.",
-                "last time of the table against the next reference, or the end of the flight",
-                at_least=True,
-            )
+    ends = [*(start for start, _ in steps[1:]), duration]
+    pairs = enumerate(zip(steps, ends, strict=True))
+    return {i: (float(one.times[-1]), float(end)) for i, ((_, one), end) in pairs if isinstance(one, Table)}
+
+
+def _tables(craft: SatelliteCraft, mission: Mission) -> Iterator[Check]:
+    for i, (last, needed) in tables_of(craft, mission.timing.duration).items():
+        yield Check(
+            f"geometry.reference_{i + 1}_end",
+            last,
+            needed,
+            "s",
+            "fail",
+            f"The table of reference {i + 1} ends before it is needed no more: the attitude stands from there on.",
+            "Give later rows, or another [[reference]] from then on.",
+            "last time of the table against the next reference, or the end of the flight",
+            at_least=True,
+        )
 
 
 def _steps(craft: SatelliteCraft) -> list[tuple[float, Reference]]:
