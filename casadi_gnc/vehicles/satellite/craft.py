@@ -39,7 +39,7 @@ from casadi_gnc.signals import Layout
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, table
 
-from . import actuating, budgets, part_tables
+from . import actuating, part_tables, unfit_times
 from .attitude_tables import InitialAttitude
 from .estimator_tables import AnyEstimator
 from .orbit_tables import Environment, FieldTable, OrbitTable
@@ -290,32 +290,8 @@ class SatelliteCraft(Craft):
         return actuating.flaws(self, self.actuators())
 
     def untimely(self, timing: Timing, *, strict: bool) -> Iterator[MisfitError]:
-        """Yield sensors that do not fit the sample period, or have no samples; modes above the sampling frequency, and
-        tables of a reference that end early.
-        """
-        yield from self._unheard(timing)
-        if not strict:
-            return
-        swings = {"flexible_mode": self.flexible_mode, "slosh": self.slosh}
-        for kind, i, each in ((kind, i, each) for kind, tables in swings.items() for i, each in enumerate(tables)):
-            if timing.mode == "sampled" and each.frequency_Hz * timing.sample_period > 1:
-                told = f"{each.frequency_Hz:g} Hz is above the sampling frequency, {1 / timing.sample_period:g} Hz"
-                yield MisfitError(f"{told}; sample faster, or leave it out", kind, i, "frequency_Hz")
-        for i, (last, needed) in budgets.tables_of(self, timing.duration).items():
-            if last < needed:
-                told = f"the table ends at {last:g} s and is needed until {needed:g} s"
-                yield MisfitError(f"{told}; give later rows, or another [[reference]] from then on", "reference", i)
-
-    def _unheard(self, timing: Timing) -> Iterator[MisfitError]:
-        for i, sensor in enumerate(self._sensors()):
-            if timing.mode != "sampled":
-                told = f"{sensor.name} is a sensor that is sampled; fly in mode sampled"
-                yield MisfitError(told, "sensor", i, "kind")
-                continue
-            try:
-                replace(sensor, hold=timing.sample_period)
-            except FlightError as error:
-                yield MisfitError(str(error), "sensor", i, "period_s")
+        """Yield what does not fit the times of a flight: sensors, and if strict modes, liquids and tables."""
+        return unfit_times.misfits(self, self._sensors(), timing, strict=strict)
 
     def regulated(self, mission: Mission) -> dict[str, list[float]]:
         """Return the attitude of a reference that stays, and rest; of one that moves, nothing."""
