@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import braked_block
 import casadi as ca
 import numpy as np
 import pytest
@@ -22,23 +23,7 @@ from casadi_gnc.tuning.certificate import box_of, certificate
 from casadi_gnc.tuning.objective import Objective
 from casadi_gnc.tuning.reach import Reach
 
-FILE = """format = 1
-kind = "mission"
-title = "A block is braked"
-
-[spacecraft]
-model = "./block.py:BlockCraft"
-
-[timing]
-mode = "sampled"
-sample_period_s = 0.1
-duration_s = 5.0
-
-[[scheme]]
-name = "brake"
-law = {{ type = "./block.py:Brake", brake_gain = 5.0 }}
-
-[[requirement]]
+FILE = """[[requirement]]
 id = "SLOW"
 formula = "always[2, 5](abs(speed[1]) <= {most})"
 
@@ -53,9 +38,7 @@ uniform = [-0.5, 0.5]
 
 
 def written(folder: Path, most: float, low: float, high: float) -> Path:
-    (folder / "block.py").write_text(Path(__file__).with_name("block.py").read_text())
-    (folder / "block.toml").write_text(FILE.format(most=most, low=low, high=high))
-    return folder / "block.toml"
+    return braked_block.written(folder, 5.0, FILE.format(most=most, low=low, high=high))
 
 
 def proved(folder: Path, most: float, low: float, high: float):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from braked_block import written
 
 import casadi_gnc as gnc
 from casadi_gnc.campaigns import DispersionTable
@@ -76,22 +77,7 @@ def test_a_wheel_without_a_fault_is_told():
         claimed(mission, "observers_robust", ["allocation"])
 
 
-BLOCK = """format = 1
-kind = "mission"
-
-[spacecraft]
-model = "./block.py:BlockCraft"
-
-[timing]
-mode = "sampled"
-sample_period_s = 0.1
-duration_s = 5.0
-
-[[scheme]]
-name = "brake"
-law = { type = "./block.py:Brake", brake_gain = 5.0 }
-
-[[requirement]]
+SLOW = """[[requirement]]
 id = "SLOW"
 formula = "always[2, 5](abs(speed[1]) <= 0.08)"
 """
@@ -103,9 +89,7 @@ def test_a_break_within_a_theorem_s_set_lies_where_it_does_by_hand(tmp_path):
 
     The law covers winds up to 0.5, and the file disperses nothing.
     """
-    (tmp_path / "block.py").write_text(Path(__file__).with_name("block.py").read_text())
-    (tmp_path / "block.toml").write_text(BLOCK)
-    found = gnc.falsify(tmp_path / "block.toml", "SLOW", claims=["theorem"], out=tmp_path / "broken.toml")
+    found = gnc.falsify(written(tmp_path, 5.0, SLOW), "SLOW", claims=["theorem"], out=tmp_path / "broken.toml")
     assert found.broken is not None
     (moved,) = found.broken.moved
     right = 5 * (0.08 - 0.5**20) / (1 - 0.5**20)

@@ -5,10 +5,10 @@ import json
 import subprocess
 import sys
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
+from braked_block import written
 
 import casadi_gnc as gnc
 from casadi_gnc.errors import GncError
@@ -36,22 +36,7 @@ key = "initial.angle_deg"
 normal = { mean = 60.0, deviation = 5.0, truncate = 3.0 }
 """
 
-BLOCK = """format = 1
-kind = "mission"
-
-[spacecraft]
-model = "./block.py:BlockCraft"
-
-[timing]
-mode = "sampled"
-sample_period_s = 0.1
-duration_s = 5.0
-
-[[scheme]]
-name = "brake"
-law = { type = "./block.py:Brake", brake_gain = 2.0 }
-
-[[dispersion]]
+DISPERSED = """[[dispersion]]
 key = "spacecraft.wind_N"
 uniform = [-0.5, 0.5]
 
@@ -133,10 +118,8 @@ def test_the_worst_case_is_that_which_follows_by_hand(tmp_path):
     Wind is uniform up to 0.5, the start normal and looked at up to four deviations: 0.5 and 1 + 4 * 0.1. After n
     samples v is (1 - k h)^n (v0 - w/k) + w/k, which stays above zero.
     """
-    (tmp_path / "block.py").write_text(Path(__file__).with_name("block.py").read_text())
-    (tmp_path / "block.toml").write_text(BLOCK)
-    found = gnc.tune(tmp_path / "block.toml", ["brake_gain=1:4"], cost="integral(speed)", against="worst",
-                     iterations=2, threads=1)  # fmt: skip
+    path = written(tmp_path, 2.0, DISPERSED)
+    found = gnc.tune(path, ["brake_gain=1:4"], cost="integral(speed)", against="worst", iterations=2, threads=1)
     worst = found.cases[-1]
     assert worst.values == pytest.approx([0.5, 1.4], rel=1e-3)
     means = []
