@@ -91,19 +91,22 @@ def attitude_per_torque(mission: Mission, scheme: Scheme) -> np.ndarray | None:
 def torque_at_the_end(craft: SatelliteCraft, mission: Mission) -> np.ndarray:
     """Return d + G f(Om) in the last part of the flight, (K, 3), [N m], body axes; wheels as at the end."""
     times = np.linspace(0.0, mission.timing.duration, _TIMES + 1)
-    torques = on_reference(craft, times)[0]
-    return torques[times >= (1 - _LAST) * times[-1]] + (friction_after(craft, times) if craft.wheel else 0.0)
+    torques, attitudes, rates = on_reference(craft, times)
+    friction = np.zeros(3)
+    if any(each.coulomb_N_m or each.viscous_N_m_s_per_rad for each in craft.wheel):
+        friction = friction_after(craft, times, stored_along(craft, times, torques, attitudes, rates[0]))
+    return torques[times >= (1 - _LAST) * times[-1]] + friction
 
 
-def friction_after(craft: SatelliteCraft, times: np.ndarray) -> np.ndarray:
-    """Return G f(Om), (3,), [N m], at the last of `times`, which begin at 0."""
+def friction_after(craft: SatelliteCraft, times: np.ndarray, stored: np.ndarray) -> np.ndarray:
+    """Return G f(Om), (3,), [N m], at the last of K times that begin at 0, of wheels that store s, (3, K), [N m s]."""
     wheels, keys = part_tables.wheels(craft.wheel), craft.momentum
     axes, spin = (np.array(ca.DM(each)) for each in (wheels.axes, wheels.spin_inertia))
     spin, back = spin.ravel(), np.linalg.pinv(axes)
     speed = ca.SX.sym("speed", len(spin))
     friction = ca.Function("friction", [speed], [wheels.friction(speed)])
     first = np.array(craft.start()["wheel_speed"], dtype=float)
-    shared, turnless = back @ _stored(craft, times), np.eye(len(spin)) - back @ axes
+    shared, turnless = back @ stored, np.eye(len(spin)) - back @ axes
     rest = turnless @ (spin * np.array(keys.rest_speeds_rad_per_s or np.zeros(len(spin))))
 
     def slowed(t: float, n: np.ndarray) -> np.ndarray:
@@ -119,8 +122,15 @@ def friction_after(craft: SatelliteCraft, times: np.ndarray) -> np.ndarray:
     return axes @ np.array(friction((shared[:, -1] + n) / spin)).ravel()
 
 
-def _stored(craft: SatelliteCraft, times: np.ndarray) -> np.ndarray:
-    """Return what the wheels store along the reference, (3, K), [N m s], body axes."""
+def stored_along(
+    craft: SatelliteCraft, times: np.ndarray, torques: np.ndarray, attitudes: np.ndarray, rate: np.ndarray
+) -> np.ndarray:
+    """Return what the wheels store along the reference, (3, K), [N m s], body axes.
+
+    Parameters
+    ----------
+    times : (K,), [s]. torques, attitudes : there, as `on_reference` tells. rate : of the reference at first, [rad/s].
+    """
     wheels = part_tables.wheels(craft.wheel)
     start = {name: np.array(value, dtype=float) for name, value in craft.start().items()}
     axes = np.array(ca.DM(wheels.axes))
@@ -128,11 +138,10 @@ def _stored(craft: SatelliteCraft, times: np.ndarray) -> np.ndarray:
     inertia = np.array(ca.DM(craft.belief().inertia)) + store @ axes.T
     first = np.array(quaternions.dcm(quaternions.from_mrp(ca.DM(start["mrp"]))))
     whole = first.T @ (inertia @ start["rate"] + store @ start["wheel_speed"])
-    torques, attitudes, rates = on_reference(craft, times)
     # By the trapezoidal rule, of s exp(k t).
     grown = np.exp(craft.momentum.unload_per_s * (times - times[-1]))[:, None]
     pushed = np.einsum("kij,ki->kj", attitudes, torques) * grown
     gained = np.cumsum(np.diff(times)[:, None] * (pushed[1:] + pushed[:-1]) / 2, axis=0)
-    begun = (whole - attitudes[0].T @ inertia @ rates[0]) * grown[0]
+    begun = (whole - attitudes[0].T @ inertia @ rate) * grown[0]
     stored = (begun + np.vstack([np.zeros(3), gained])) / grown
     return np.einsum("kij,kj->ik", attitudes, stored)
