@@ -8,11 +8,17 @@ from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does, before NumPy is imported
 
+import hypothesis
 import numpy as np
 import pytest
 
 import casadi_gnc
 from casadi_gnc.system.compilers import Compiler, _probe
+
+# Drawn examples are the same at every run, so that a change is judged by what it changes; who searches for new ones
+# says --hypothesis-profile=default.
+hypothesis.settings.register_profile("repeatable", derandomize=True, database=None)
+hypothesis.settings.load_profile("repeatable")
 
 # Independent implementations that tests and benchmarks compare with, and what measures, which imports its neighbours.
 sys.path[:0] = [str(Path(__file__).parent / folder) for folder in ("oracles", "bench")]

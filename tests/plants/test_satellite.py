@@ -82,17 +82,33 @@ def coasting(body: Assembly, h: float) -> tuple[ca.Function, ca.Function, np.nda
     )
 
 
+def drifts(body: Assembly, h: float) -> tuple[float, float, np.ndarray]:
+    """Return what twenty seconds change of the momentum and the energy, relative, and of the state.
+
+    The momentum's measure is all that adds up to it: wheels against each other may leave next to nothing of it.
+    """
+    step, kept, start = coasting(body, h)
+    end = np.array(step.fold(round(20 / h))(start)).ravel()
+    (before, energy), (after, left) = (tuple(np.array(v).ravel() for v in kept(x)) for x in (start, end))
+    stored = sum(
+        np.abs(np.multiply(part.speed, part.spin_inertia)).sum() for part in body.components if isinstance(part, Wheels)
+    )
+    lost = np.linalg.norm(after - before) / (np.linalg.norm(before) + stored)
+    return lost, abs(left - energy)[0] / energy[0], end - start
+
+
 @settings(max_examples=6, deadline=None)
 @given(st.integers(0, 10**6), st.integers(0, 8), st.integers(0, 3), st.integers(0, 2), st.integers(0, 2))
 def test_momentum_and_energy_are_conserved(seed, wheels, modes, liquids, panels):
-    """Twenty seconds at 4 ms; RK4 leaves h^4 of the fastest swing, some 1e-13, beside rounding of 5000 steps."""
-    step, kept, start = coasting(random_parts(seed, wheels, modes, liquids, panels), 0.004)
-    end = np.array(step.fold(5000)(start)).ravel()
-    (before, energy), (after, left) = (tuple(np.array(v).ravel() for v in kept(x)) for x in (start, end))
-    assert np.linalg.norm(after - before) < 1e-11 * np.linalg.norm(before)
-    assert abs(left - energy) < 1e-11 * energy
+    """To 1e-11 at 4 ms, or where RK4 leaves more of a fast swing, at 2 ms: it leaves a 16th of that, rounding apart."""
+    body = random_parts(seed, wheels, modes, liquids, panels)
+    momentum, energy, moved = drifts(body, 0.004)
+    if max(momentum, energy) > 1e-11:
+        assert max(momentum, energy) < 1e-9
+        momentum, energy, _ = drifts(body, 0.002)
+    assert max(momentum, energy) < 1e-11
     if modes or liquids or panels:
-        assert np.abs(end[6 + wheels :] - start[6 + wheels :]).max() > 1e-3  # something swung
+        assert np.abs(moved[6 + wheels :]).max() > 1e-3  # something swung
 
 
 def test_liquid_moves_as_two_masses_on_a_spring():
