@@ -15,6 +15,7 @@ from casadi_gnc.delivery.vectors import fly_package
 from casadi_gnc.embedded import boards as known_boards
 from casadi_gnc.embedded import frames, package, targets
 from casadi_gnc.embedded.controller import Controller, Options
+from casadi_gnc.embedded.coverage import COVERAGE, coverage
 from casadi_gnc.embedded.frames import package_files
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import MOST_STEPS
@@ -151,7 +152,10 @@ def pack(
         files = package_files(thing, options)
         package.put(workshop, {**files, "test/replay.h": thing.replay_header(options, about["steps"])})
         host = HostPackage(workshop, options.name)
-        files |= thing.replay_files(options, *flown(host), about["spoiled"])
+        inputs, outputs = flown(host)
+        files |= thing.replay_files(options, inputs, outputs, about["spoiled"])
+        taken = coverage(files, options.name, inputs, outputs.shape[1])
+        files[COVERAGE] = taken.to_text()
         package.put(workshop, files)
         measured = [
             {
@@ -164,7 +168,7 @@ def pack(
         ]
         files["README.md"] = readme(measured, (host.state_size, host.params_size)) + frames.note(options)
         files |= sources
-        files[package.MANIFEST] = package.manifest(files, about)
+        files[package.MANIFEST] = package.manifest(files, {**about, "coverage": taken.summary})
         return files
 
     package.write(folder, files_of, force=force)

@@ -16,6 +16,7 @@ from casadi_gnc.delivery.packaging import REALS, warnings
 from casadi_gnc.delivery.vectors import WORDS, fly_package
 from casadi_gnc.embedded import compare, package
 from casadi_gnc.embedded.controller import Options
+from casadi_gnc.embedded.coverage import COVERAGE, coverage
 from casadi_gnc.embedded.frames import package_files
 from casadi_gnc.embedded.host import HostPackage
 from casadi_gnc.embedded.manifest import digest
@@ -69,6 +70,8 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
     options = Options(about["name"], REALS[about["real"]], frame=about["frame"])  # type: ignore[arg-type]
     files = package_files(made, options)
     files |= made.replay_files(options, inputs, outputs, about["spoiled"])
+    taken = coverage(files, options.name, inputs, height)
+    files[COVERAGE] = taken.to_text()
     package.put(shop / ANEW, files)
     host = HostPackage(shop / ANEW, options.name)
     put_words(shop, "anew", host.replay(inputs, height))
@@ -83,6 +86,7 @@ def rebuild(shop: Path, about: dict[str, Any]) -> dict[str, Any]:
         put_words(shop, name, words)
     return {
         "files": {path: digest(text) for path, text in files.items()},
+        "coverage": taken.summary,
         "outputs": [{"name": one.name, "size": one.size, "unit": one.unit} for one in made.replayed.signals],
         "title": made.title,
         "scheme": made.scheme,

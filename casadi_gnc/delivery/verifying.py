@@ -45,6 +45,7 @@ class _Rebuilt(_Answer):
     """What the process that made the package again answers."""
 
     files: dict[str, str]
+    coverage: dict[str, int]
     outputs: list[_Output]
     title: str
     scheme: str
@@ -251,6 +252,8 @@ class _Bench:
             shipped = content(self._folder / path) if (self._folder / path).exists() else None
             if shipped is None or digest(shipped.decode("utf-8", "replace")) != sha256:
                 found.append(path)
+        if self._about.coverage != self.anew.coverage:
+            found.append(MANIFEST)
         return found
 
 

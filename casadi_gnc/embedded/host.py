@@ -80,6 +80,10 @@ class HostPackage:
         )
         return found
 
+    def counts(self, symbol: str, size: int) -> list[int]:
+        """Return so many counts of an array of `unsigned long long` in the package."""
+        return list((ctypes.c_ulonglong * size).in_dll(self._c, symbol))
+
 
 def _pointer(array: np.ndarray) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)

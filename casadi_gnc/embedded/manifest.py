@@ -76,6 +76,7 @@ class Manifest(_Model):
     spoiled: Annotated[int, Field(ge=0, le=MOST_STEPS)]
     problem: MadeOf
     made_by: MadeBy
+    coverage: dict[str, int] = {}
     files: Annotated[dict[_Path, _Hash], Field(min_length=1)]
 
 
