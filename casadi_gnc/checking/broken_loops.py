@@ -16,6 +16,7 @@ import numpy as np
 
 from casadi_gnc.checking.linear import held, loop_at, moving_rows, moving_states
 from casadi_gnc.checking.margins import BrokenLoop, Margins, common_gain, disk_of_all, margins
+from casadi_gnc.checking.mass_centre import MassCentreBounds, mass_centre_bounds
 from casadi_gnc.checking.sampling import settled
 from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.linear_plant import names_of, unlimited
@@ -38,6 +39,7 @@ class SchemeMargins:
         over the believed one, or the believed mass and inertia over the true ones.
     disk_of_efforts : alpha that all efforts bear at once, each with a factor of its own.
     loop : the loop cut at all efforts, for pictures.
+    mass_centre : how far off the centre of mass may be; None where it was not asked for.
     """
 
     scheme: str
@@ -47,10 +49,16 @@ class SchemeMargins:
     effort_high: float
     disk_of_efforts: float
     loop: BrokenLoop
+    mass_centre: MassCentreBounds | None = None
 
 
-def scheme_margins(mission: Mission, scheme: Scheme) -> SchemeMargins:
+def scheme_margins(mission: Mission, scheme: Scheme, *, mass_centre: bool = False) -> SchemeMargins:
     """Return the margins of a scheme at its target, held still where it moves, sampled as it flies.
+
+    Parameters
+    ----------
+    mission, scheme : what flies.
+    mass_centre : whether the bounds of the mass centre are looked for; that takes seconds.
 
     Raises
     ------
@@ -74,7 +82,8 @@ def scheme_margins(mission: Mission, scheme: Scheme) -> SchemeMargins:
             if np.any(cut.B) and np.any(cut.C):  # a channel that is read and moves something
                 channels[name] = margins(cut)
     low, high = common_gain(efforts)
-    return SchemeMargins(scheme.name, at, channels, low, high, disk_of_all(efforts)[0], efforts)
+    bounds = mass_centre_bounds(mission, scheme) if mass_centre else None
+    return SchemeMargins(scheme.name, at, channels, low, high, disk_of_all(efforts)[0], efforts, bounds)
 
 
 def read_by(mission: Mission, scheme: Scheme) -> Layout:

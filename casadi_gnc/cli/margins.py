@@ -26,7 +26,10 @@ def margins(
     ending: Format = Ending.png,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
-    """Show gain, phase, delay, modulus and disk margins of each effort and measurement, sampled as it flies."""
+    """Show gain, phase, delay, modulus and disk margins of each effort and measurement, sampled as it flies.
+
+    Then how far the true mass and inertia may be from the believed ones, and the centre of mass from the known one.
+    """
     from casadi_gnc.checking.broken_loops import scheme_margins
     from casadi_gnc.errors import FlightError
     from casadi_gnc.problem_files.loading import load
@@ -38,7 +41,7 @@ def margins(
     with Progress("margins") as told:
         for done, one in enumerate(asked, 1):
             try:
-                found.append(scheme_margins(mission, one))
+                found.append(scheme_margins(mission, one, mass_centre=True))
             except FlightError as error:
                 lacking.append(str(error))
             told(done, len(asked))
@@ -90,6 +93,27 @@ def _print(title: str, found: list[SchemeMargins]) -> None:
             markup=False,
             highlight=False,
         )
+        console.print(_of_mass_centre(one), markup=False, highlight=False)
+
+
+def _of_mass_centre(one: SchemeMargins) -> str:
+    found = one.mass_centre
+    assert found is not None
+    if found.why:
+        return f"{one.scheme}: no bound of the mass centre: {found.why}"
+
+    def end(value: float) -> str:
+        return f"{value:+.3g}" if math.isfinite(value) else "any"
+
+    axes = "; ".join(
+        f"axis {i}: {end(low)} to {end(high)}"
+        for i, (low, high) in enumerate(zip(found.low, found.high, strict=True), 1)
+    )
+    told = f"{one.scheme}: stable for a mass centre off the known one, along one axis, [m], {axes}"
+    if not math.isfinite(found.nearest):
+        return told
+    towards = ", ".join(f"{each:.2f}" for each in found.towards)
+    return f"{told}; nearest bound found: {found.nearest:.3g} m towards ({towards})"
 
 
 def _or_any(value: float) -> str:
@@ -101,6 +125,18 @@ def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> N
 
     def number(value: float) -> float | None:
         return value if math.isfinite(value) else None
+
+    def centre(one: SchemeMargins) -> dict[str, Any]:
+        found = one.mass_centre
+        assert found is not None
+        return {
+            "key": found.key,
+            "low_m": list(map(number, found.low)),
+            "high_m": list(map(number, found.high)),
+            "nearest_m": number(found.nearest),
+            "towards": list(found.towards) if math.isfinite(found.nearest) else None,
+            "why_none": found.why,
+        }
 
     def data(one: SchemeMargins) -> dict[str, Any]:
         channels = {
@@ -114,6 +150,7 @@ def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> N
             "effort_low": one.effort_low,
             "effort_high": number(one.effort_high),
             "disk_of_efforts": one.disk_of_efforts,
+            "mass_centre": centre(one),
         }
 
     content = {"problem": title, "schemes": [data(one) for one in found], "notes": lacking}

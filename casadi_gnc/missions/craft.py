@@ -187,6 +187,13 @@ class Craft(Part):
         """Return sentences that a reader of every flight must see."""
         return ()
 
+    def mass_centre_key(self) -> str:
+        """Return the key, (3,), [m], of how far the true centre of mass is off the known one; "" without such.
+
+        `casadi-gnc margins` says by it how far off that centre may be. It is for crafts that forces turn.
+        """
+        return ""
+
     def key_of(self, signal: str) -> tuple[str, ...]:
         """Return the path of the key of a file that gives a signal of the state its start, for messages."""
         return ("initial",)

@@ -94,6 +94,8 @@ def check(problem: str | Path | Mission, scheme: str | None = None) -> list[Chec
 def margins(problem: str | Path | Mission, scheme: str | None = None) -> list[SchemeMargins]:
     """Return the stability margins of a mission's schemes, or of one of them, linearised at its target.
 
+    With them go the bounds of the mass centre (`SchemeMargins.mass_centre`).
+
     Parameters
     ----------
     problem : a mission, a problem file, or the name of a shipped one.
@@ -115,7 +117,7 @@ def margins(problem: str | Path | Mission, scheme: str | None = None) -> list[Sc
     with _about(problem):
         mission = mission_of(problem)
         chosen = mission.schemes if scheme is None else (mission.scheme(scheme),)
-        return [scheme_margins(mission, one) for one in chosen]
+        return [scheme_margins(mission, one, mass_centre=True) for one in chosen]
 
 
 def vary(

@@ -153,6 +153,8 @@ def test_command(tmp_path):
     assert one["scheme"] == "pd_pinv"
     assert set(one["channels"]) == {f"{name} {i}" for name in ("torque", "mrp", "rate") for i in (1, 2, 3)}
     assert one["channels"]["torque 1"]["gain_high"] == pytest.approx(one["effort_high"], rel=1e-3)
+    assert one["mass_centre"]["low_m"][0] == pytest.approx(-0.33138, rel=1e-3)  # the axis at which det T(d) is zero
+    assert one["mass_centre"]["why_none"] == ""
     drawn = tmp_path / "margins.svg"
     told = CliRunner().invoke(
         app, ["margins", "huang2020/slew", "--scheme", "pd_pinv", "--figures", str(tmp_path), "--format", "svg"]

@@ -60,6 +60,22 @@ class Channel(TypedDict):
 
 
 @_TOLD
+class MassCentre(TypedDict):
+    """Errors of the mass centre, true minus known, for which the loop is stable."""
+
+    key: str
+    """Of a file, of that error; empty where the craft has none."""
+    low_m: list[float | None]
+    """End along each axis, the others without error; null where it is stable as far as a kilometre."""
+    high_m: list[float | None]
+    nearest_m: float | None
+    """Least distance at which it is not, of all directions that were looked at."""
+    towards: list[float] | None
+    why_none: str
+    """Why there is no bound; empty where there is one."""
+
+
+@_TOLD
 class SchemeMargins(TypedDict):
     """Margins of one scheme."""
 
@@ -71,6 +87,7 @@ class SchemeMargins(TypedDict):
     effort_high: float | None
     disk_of_efforts: float
     """Radius of the disk in which each effort may have a factor of its own."""
+    mass_centre: MassCentre
 
 
 @_TOLD

@@ -190,6 +190,10 @@ class CombinedSpacecraftCraft(Craft, Orientation):
             return {}
         return mass_centre(told.centre_of_mass_error_m)
 
+    def mass_centre_key(self) -> str:
+        """Return the key of the error of the centre of mass."""
+        return "truth.centre_of_mass_error_m"
+
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether the thrusters leave an axis out."""
         strength = np.linalg.svd(np.array(self._thought().thrusters.effectiveness), compute_uv=False)

@@ -285,6 +285,10 @@ class SatelliteCraft(Craft):
         """Return the actuation of a scheme; [momentum] takes the place of its allocation."""
         return actuating.actuation(self, self.actuators(), keys if isinstance(keys, EffortKeys) else EffortKeys())
 
+    def mass_centre_key(self) -> str:
+        """Return the key of the error of the centre of mass."""
+        return "truth.centre_of_mass_error_m"
+
     def flaws(self) -> Iterator[MisfitError]:
         """Yield whether wheels and thrusters leave an axis out."""
         return actuating.flaws(self, self.actuators())

@@ -182,6 +182,10 @@ class WheelSpacecraftCraft(Craft, Orientation):
 
         return checks(self, mission, scheme)
 
+    def mass_centre_key(self) -> str:
+        """Return the key of the error of the centre of mass."""
+        return "" if self.wheels.as_points is None else "truth.centre_of_mass_error_m"
+
     def true_effectivenesses(self, mission: Mission, scheme: Scheme) -> dict[str, np.ndarray]:
         """Return the true effectiveness without faults, and with each set of faults that come together."""
         real = np.array(ca.DM(self._array(self.truth.centre_of_mass_error_m).effectiveness))
