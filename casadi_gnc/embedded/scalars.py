@@ -50,6 +50,7 @@ _CALLS = {
     ca.OP_FLOOR: "floor",
     ca.OP_CEIL: "ceil",
     ca.OP_FMOD: "fmod",
+    ca.OP_REMAINDER: "remainder",
     ca.OP_COPYSIGN: "copysign",
 }
 #: Functions of the C library that gnc_math.h does not have.

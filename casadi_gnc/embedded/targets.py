@@ -30,7 +30,7 @@ PATIENCE = 600.0
 #: Symbols of arithmetic on doubles in software, and functions of the C library on doubles.
 _DOUBLE = re.compile(
     r"^(__aeabi_(d|[a-z0-9]+2d|cd)\w*|__\w*df\w*|__\w*(extendsfdf2|truncdfsf2)|"
-    r"(sin|cos|tan|exp|log|pow|sqrt|fabs|floor|ceil|tanh|atan2?|asin|acos|expm1|log1p|fmod))$"
+    r"(sin|cos|tan|exp|log|pow|sqrt|fabs|floor|ceil|tanh|atan2?|asin|acos|expm1|log1p|fmod|remainder))$"
 )
 #: Numbers at the head of what a program writes, in the order of `enum number` in measure.c.
 _NUMBERS = 9

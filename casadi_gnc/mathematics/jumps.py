@@ -5,9 +5,9 @@ last stage already sees beyond a jump at its end is of order 1. So every decisio
 of the step is, for all of its stages: with jumps between steps the method keeps its order, and a jump inside a step
 happens at one of its ends.
 
-A decision is a comparison, `floor`, `ceil`, the sign that `copysign` takes, or the whole periods that `fmod` takes
-away (by a fixed divisor), of operands that depend on time and on nothing that moves within a step. Decisions on the
-state are none: nobody knows beforehand when they turn.
+A decision is a comparison, `floor`, `ceil`, the sign that `copysign` takes, or the whole periods that `fmod` and
+`remainder` take away (by a fixed divisor), of operands that depend on time and on nothing that moves within a step.
+Decisions on the state are none: nobody knows beforehand when they turn.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import casadi as ca
 
 _COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE)
 _ROUNDING = (ca.OP_FLOOR, ca.OP_CEIL)
+_WHOLE = (ca.OP_FMOD, ca.OP_REMAINDER)
 #: Names of ports besides the columns.
 _TIME, _REST = " time", " parameters"
 
@@ -76,7 +77,7 @@ class Timed:
                 known = [timed[i] for i in given]
                 if code in (*_COMPARISONS, *_ROUNDING):
                     decision = None not in known and any(known)
-                elif code == ca.OP_FMOD:
+                elif code in _WHOLE:
                     decision = known == [True, False]
                 elif code == ca.OP_COPYSIGN:
                     decision = bool(known[1])
@@ -144,7 +145,7 @@ def _made(code: int, operands: Sequence[ca.SX]) -> ca.SX:
 
 def _decided(code: int, operands: Sequence[tuple[ca.SX, ca.SX]], there: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return the value in this stage under the decision in the middle, and what was decided."""
-    if code == ca.OP_FMOD:
+    if code in _WHOLE:
         (dividend, middle), (divisor, _) = operands
         whole = middle - there
         return dividend - whole, whole / divisor

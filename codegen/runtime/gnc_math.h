@@ -28,7 +28,8 @@
  *    |x| 2^-52 (|x| 2^-23), and from |x| > 2^30 (2^17) on the argument counts as zero. The result stays
  *    finite, and in [-1, 1] for sin and cos;
  *  - fmod: exact for |x/y| < 2^52 (2^23). Beyond, zero with the sign of x (the exact remainder needs a
- *    loop, and says nothing when neighbours of x differ by more than y).
+ *    loop, and says nothing when neighbours of x differ by more than y); remainder: the same from 2^53
+ *    (2^24) on.
  *
  * Words used below: a *pair* is an unevaluated sum hi + lo with |lo| at most half an ulp of hi.
  */
@@ -193,6 +194,21 @@ GNC_INLINE double gnc_fmod(double x, double y) {
     const double checked = x_raw < gnc_inf_() ? gnc_copysign(finite, x) : gnc_nan_();
     const double nonzero = y_raw > 0.0 ? checked : gnc_nan_();
     return x == x ? nonzero : gnc_nan_();
+}
+
+/*
+ * x less the whole multiple of y next to x, of two as near the even one: what IEEE 754 calls the remainder; exact for
+ * |x/y| < 2^53. After fmod by 2 |y| the quotient left is below 2, and its parity is that of the whole one; the
+ * differences of neighbours are exact.
+ */
+GNC_INLINE double gnc_remainder(double x, double y) {
+    const double b = gnc_fabs(y);
+    const double rest = gnc_fmod(gnc_fabs(x), b + b);
+    const double past = rest - b;
+    const double beyond = past + past >= b ? past - b : past;
+    const double near_x = rest + rest <= b ? rest : beyond;
+    const double found = gnc_copysign(1.0, x) * near_x;
+    return rest == rest ? found : gnc_nan_();
 }
 
 /* ---- Exponentials ---------------------------------------------------------------------------------- */

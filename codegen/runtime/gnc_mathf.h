@@ -191,6 +191,21 @@ GNC_INLINE float gnc_fmodf(float x, float y) {
     return x == x ? nonzero : gnc_nanf_();
 }
 
+/*
+ * x less the whole multiple of y next to x, of two as near the even one: what IEEE 754 calls the remainder; exact for
+ * |x/y| < 2^24. After fmod by 2 |y| the quotient left is below 2, and its parity is that of the whole one; the
+ * differences of neighbours are exact.
+ */
+GNC_INLINE float gnc_remainderf(float x, float y) {
+    const float b = gnc_fabsf(y);
+    const float rest = gnc_fmodf(gnc_fabsf(x), b + b);
+    const float past = rest - b;
+    const float beyond = past + past >= b ? past - b : past;
+    const float near_x = rest + rest <= b ? rest : beyond;
+    const float found = gnc_copysignf(1.0f, x) * near_x;
+    return rest == rest ? found : gnc_nanf_();
+}
+
 /* ---- Exponentials ---------------------------------------------------------------------------------- */
 
 /* e^(x + x_lo) = 2^k (1 + r + t), |r| <= ln(2)/2, t of the order of r^2. */

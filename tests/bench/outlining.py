@@ -39,7 +39,7 @@ MISSIONS = (
     "satellites/earth_pointing_day",
 )
 ONE = "sin|cos|tan|asin|acos|atan|exp|expm1|log|log1p|sinh|cosh|tanh|erf"
-TWO = "atan2|pow|fmod"
+TWO = "atan2|pow|fmod|remainder"
 RUNTIME = assets.folder("codegen") / "runtime"
 FLIGHTS, SAMPLES = 64, 150
 

@@ -47,11 +47,11 @@ def code(name: str) -> int:
     return getattr(ca, f"OP_{name.upper()}")
 
 
-def random_graph(seed: int, operations: int) -> ca.Function:
+def random_graph(seed: int, operations: int, *also: str) -> ca.Function:
     """Return a function of random operations on values that stay of order one, each operation in turn."""
     rng, x = np.random.default_rng(seed), ca.SX.sym("x", 4)
     values = ca.vertsplit(x)
-    names = [*UNARY, *BINARY]
+    names = [*UNARY, *BINARY, *also]
     while len(values) < operations:
         name = names[(seed + len(values)) % len(names)]
         one, other = (values[i] for i in rng.integers(max(0, len(values) - 40), len(values), 2))
@@ -125,6 +125,7 @@ def steps_of_missions() -> list[ca.Function]:
 def test_more_than_two_hundred_functions_have_the_words_of_the_machine():
     functions = [random_graph(seed, 20 + seed % 40) for seed in range(130)]
     functions += [random_graph(1000 + seed, 150) for seed in range(15)] + [random_graph(2000, 2500)]
+    functions += [random_graph(3000 + seed, 80, "remainder") for seed in range(5)]
     functions += [*shapes(), *steps_of_missions(), network(), kalman(solve=False)]
     assert len(functions) >= 200
     printed, rng = Printed(functions, optimise="-O1"), np.random.default_rng(11)

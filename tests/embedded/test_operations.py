@@ -18,6 +18,7 @@ UNARY = {
 BINARY = {
     "add": lambda x, y: x + y, "sub": lambda x, y: x - y, "mul": lambda x, y: x * y, "div": lambda x, y: x / y,
     "pow": mpmath.power, "atan2": mpmath.atan2, "fmod": lambda x, y: mpmath.sign(x) * mpmath.fmod(abs(x), abs(y)),
+    "remainder": lambda x, y: x - mpmath.nint(x / y) * y,
     "copysign": lambda x, y: abs(x) if y >= 0 else -abs(x), "fmin": min, "fmax": max, "hypot": mpmath.hypot,
     "lt": lambda x, y: mpmath.mpf(x < y), "le": lambda x, y: mpmath.mpf(x <= y),
     "eq": lambda x, y: mpmath.mpf(x == y), "ne": lambda x, y: mpmath.mpf(x != y),

@@ -269,6 +269,7 @@ def test_only_decisions_on_time_alone_are_moved():
     assert at(ca.if_else(t > x, t, -t)) == (False, -2.0)
     assert at(ca.fmod(t, 1.0)) == (True, 2.0)
     assert at(ca.fmod(1.0, t)) == (False, 1.0)
+    assert at(ca.remainder(t, 1.0)) == (True, 1.0)
     assert at(ca.floor(t) + ca.ceil(t)) == (True, 1.0)
     assert at(ca.copysign(x, t - p)) == (True, -3.0)
     assert at(ca.fabs(t - p) + ca.if_else(x > p, 1, 0)) == (False, 2.0)

@@ -26,8 +26,8 @@ ONE_ARGUMENT = [
     "erf", "sqrt", "fabs", "floor", "ceil", "sign",
 ]
 # fmt: on
-TWO_ARGUMENTS = ["atan2", "pow", "fmod", "copysign", "min", "max"]
-EXACT = {"sqrt", "fabs", "floor", "ceil", "sign", "fmod", "copysign", "min", "max"}
+TWO_ARGUMENTS = ["atan2", "pow", "fmod", "remainder", "copysign", "min", "max"]
+EXACT = {"sqrt", "fabs", "floor", "ceil", "sign", "fmod", "remainder", "copysign", "min", "max"}
 KEEP_NAN = {"fabs", "floor", "ceil", "sign", "copysign", "min", "max"}
 FUNCTIONS = [*ONE_ARGUMENT, *TWO_ARGUMENTS]
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 
 import numpy as np
 from math_functions import DOUBLE, HEADERS, Precision
@@ -60,7 +61,7 @@ def arguments(name: str, p: Precision, n: int, seed: int = 20240229) -> tuple[np
         near_one = 1 - 2.0 ** -rng.uniform(1, p.digits, n)
         mixed = np.concatenate([mixed, unit, near_one, -near_one]).astype(p.dtype)
         return (mixed[np.abs(mixed) <= 1],)
-    if name in ("atan2", "copysign", "fmod", "min", "max"):
+    if name in ("atan2", "copysign", "fmod", "remainder", "min", "max"):
         other = any_finite(rng, p, n)
         with np.errstate(over="ignore"):
             related = (other * (unit * 2.0 ** rng.uniform(-30, 20, n))).astype(p.dtype)
@@ -69,7 +70,7 @@ def arguments(name: str, p: Precision, n: int, seed: int = 20240229) -> tuple[np
         b = np.concatenate([other[:size], other[:size], rng.uniform(-1, 1, size), rng.permutation(structured)])
         a, b = a.astype(p.dtype), b.astype(p.dtype)
         keep = np.isfinite(a) & np.isfinite(b) & (a != 0) & (b != 0)  # mpmath has no -0
-        if name == "fmod":
+        if name in ("fmod", "remainder"):
             with np.errstate(over="ignore", divide="ignore"):
                 keep &= np.abs(a.astype(np.longdouble) / b) < 2.0 ** (p.digits - 1)
         return a[keep], b[keep]
@@ -121,6 +122,12 @@ SPECIAL = {
         (0.0, 3, 0.0), (-0.0, 3, -0.0), (5, INF, 5), (-5, -INF, -5), (INF, 3, NAN), (-INF, 3, NAN),
         (5, 0.0, NAN), (5, -0.0, NAN), (0.0, 0.0, NAN), (NAN, 1, NAN), (1, NAN, NAN), (INF, INF, NAN),
         (6, 3, 0.0), (-6, 3, -0.0), (5, -3, 2), (-5, 3, -2), (1e30, 1e-6, 0.0), (-1e30, 1e-6, -0.0),
+    ],
+    "remainder": [
+        (0.0, 3, 0.0), (-0.0, 3, -0.0), (5, INF, 5), (-5, -INF, -5), (INF, 3, NAN), (-INF, 3, NAN),
+        (5, 0.0, NAN), (5, -0.0, NAN), (0.0, 0.0, NAN), (NAN, 1, NAN), (1, NAN, NAN), (INF, INF, NAN),
+        (6, 3, 0.0), (-6, 3, -0.0), (5, -3, -1), (-5, 3, 1), (5, 2, 1), (7, 2, -1), (1, 2, 1), (3, 2, -1), (-3, 2, 1),
+        (1e30, 1e-6, 0.0), (-1e30, 1e-6, -0.0),
     ],
     "min": [
         (1, 2, 1), (2, 1, 1), (-INF, INF, -INF), (0.0, -0.0, -0.0), (-0.0, 0.0, 0.0), (1, NAN, NAN), (NAN, 1, 1),
@@ -180,6 +187,12 @@ def _one(f: Callable) -> Callable:
     return lambda x: f(x, BITS)
 
 
+def _remainder(x, y):
+    """x - n y with n the whole number next to x/y, of two the even one, in rational numbers."""
+    a, b = (Fraction(libmp.to_float(one)) for one in (x, y))
+    return libmp.from_float(float(a - round(a / b) * b))
+
+
 #: Function to exact value, on numbers as mpmath keeps them.
 TRUTH: dict[str, Callable] = {
     name: _one(getattr(libmp, f"mpf_{name}"))
@@ -195,6 +208,7 @@ TRUTH: dict[str, Callable] = {
     "min": lambda x, y: x if libmp.mpf_lt(x, y) else y,
     "max": lambda x, y: x if libmp.mpf_gt(x, y) else y,
     "fmod": lambda x, y: libmp.from_float(math.fmod(libmp.to_float(x), libmp.to_float(y))),  # exact in C
+    "remainder": _remainder,
     "copysign": lambda x, y: libmp.mpf_abs(x) if libmp.mpf_sign(y) >= 0 else libmp.mpf_neg(libmp.mpf_abs(x)),
 }
 

@@ -91,6 +91,8 @@ static float any_float(void)
         CHECK(gnc_atan2##X(x, y), nan_x || nan_y, r >= -4 && r <= 4);                                              \
         CHECK(gnc_fmod##X(x, y), nan_x || nan_y || inf_x || y == 0,                                                \
               gnc_fabs##X(r) <= gnc_fabs##X(x) && (r == 0 || gnc_fabs##X(r) < gnc_fabs##X(y)));                    \
+        CHECK(gnc_remainder##X(x, y), nan_x || nan_y || inf_x || y == 0,                                           \
+              gnc_fabs##X(r) <= gnc_fabs##X(x) && gnc_fabs##X(r) <= gnc_fabs##X(y) / 2);                           \
         r = gnc_pow##X(x, y);                                                                                      \
         must(r == r || canonical == bits(r), "pow" #X, (double)x, (double)y, (double)r);                           \
         must(r == r || x < 0 || nan_x || nan_y, "pow" #X, (double)x, (double)y, (double)r);                        \
