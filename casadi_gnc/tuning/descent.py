@@ -9,8 +9,9 @@ model is
     with   f_i + g_i' d <= t (the largest), or their mean;   c_j + a_j' d >= 0;   |d| <= radius;   low <= z + d <= high,
 
 B by damped BFGS updates of the Lagrangian (J. Nocedal, S. Wright, Numerical Optimization, 2006, section 18.3). Where no
-step lowers the cost, or slopes are no numbers, points are drawn about the iterate and the best one is taken; a search
-that finds none in three rounds, each closer than the one before, is the statement that there is none nearby.
+step lowers the cost, or slopes are no numbers, CMA-ES searches about the iterate (`casadi_gnc.tuning.evolution`);
+without it, and along one gain, points are drawn and the best one is taken, in three rounds, each closer than the one
+before. A search that finds none is the statement that there is none nearby.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.campaigns.plans import Sobol
+from casadi_gnc.tuning import evolution
 
 #: Trust radii that are tried at once, in units of the present one.
 _RADII = (2.0, 1.0, 0.5, 0.2, 0.05, 0.01)
@@ -70,7 +72,7 @@ class Iterate:
     ----------
     z : coordinates. costs : of the cases. value : their largest, or mean.
     curvature : B. radius : of trust.
-    number : of iterations so far. how : "spread", "slope", "sampling", or what ended the descent.
+    number : of iterations so far. how : "spread", "slope", "evolution", "sampling", or what ended the descent.
     done : whether nothing better was found nearby.
     """
 
@@ -221,16 +223,24 @@ def _best(problem: Problem, at: Iterate, points: np.ndarray) -> tuple[np.ndarray
 
 
 def _sampled(problem: Problem, at: Iterate, seed: int) -> Iterate:
-    """Return the best of points drawn about the iterate, or the iterate, `done`, where none is better."""
+    """Return the best of points about the iterate, evolved or drawn, or the iterate, `done`, where none is better."""
+
+    def later(best: tuple[np.ndarray, np.ndarray] | None, how: str) -> Iterate | None:
+        if best is None or not problem.merit(best[1]) < at.value - LEAST * abs(at.value):
+            return None
+        value = float(problem.merit(best[1]))
+        return Iterate(best[0], best[1], value, np.eye(len(at.z)), at.radius, at.number + 1, how)
+
+    nothing = replace(at, number=at.number + 1, how="nothing better nearby", done=True)
+    if evolution.serves(len(at.z)):
+        return later(evolution.evolved(problem, at, seed), "evolution") or nothing
     generator = np.random.default_rng((seed, at.number))
     for share in _SHRINK:
         drawn = at.z + share * max(at.radius, 0.1) * generator.standard_normal((_DRAWN, len(at.z)))
-        best = _best(problem, at, np.clip(drawn, problem.low, problem.high))
-        if best is not None and problem.merit(best[1]) < at.value - LEAST * abs(at.value):
-            return Iterate(
-                best[0], best[1], float(problem.merit(best[1])), np.eye(len(at.z)), at.radius, at.number + 1, "sampling"
-            )
-    return replace(at, number=at.number + 1, how="nothing better nearby", done=True)
+        found = later(_best(problem, at, np.clip(drawn, problem.low, problem.high)), "sampling")
+        if found is not None:
+            return found
+    return nothing
 
 
 def _updated(B: np.ndarray, s: np.ndarray, y: np.ndarray) -> np.ndarray:

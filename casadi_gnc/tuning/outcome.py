@@ -90,7 +90,7 @@ class Tuned:
     @property
     def iterations(self) -> int:
         """Iterations that changed the gains."""
-        return sum(how in ("spread", "slope", "sampling") for _, how in self.course)
+        return sum(how in ("spread", "slope", "evolution", "sampling") for _, how in self.course)
 
     @property
     def searched(self) -> bool:

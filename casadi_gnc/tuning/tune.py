@@ -12,6 +12,7 @@ import numpy as np
 from casadi_gnc.errors import GncError, TuningError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files.by_name import mission_of
+from casadi_gnc.tuning import evolution
 from casadi_gnc.tuning.adversary import worst_case
 from casadi_gnc.tuning.conditions import conditions_of, new_troubles, verdicts_of
 from casadi_gnc.tuning.costs import cost_of
@@ -159,6 +160,13 @@ def tune(
         journal.add(**state.data())
         if state.at.number >= iterations:
             break
+    if (
+        told
+        and any(how == "sampling" for _, how in state.course)
+        and gains.size > 1
+        and not evolution.serves(gains.size)
+    ):
+        told(f"note: {evolution.ADVICE}")
     values = _rounded(problem_of(state.cases), flights, state, kept.margins, digits, lambda v: not _troubles(
         flights, v, chosen, before, bounds))  # fmt: skip
     found = outcome(mission, chosen, flights, state.cases, values, against, state.course, before)

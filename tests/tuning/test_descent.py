@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from casadi_gnc.errors import TuningError
+from casadi_gnc.tuning import evolution
 from casadi_gnc.tuning.descent import Iterate, Problem, begin, descend
 from casadi_gnc.tuning.iterates import Iterates
 from casadi_gnc.tuning.state import resumed
@@ -78,11 +79,43 @@ def test_points_that_are_not_allowed_are_never_taken():
 
 
 @pytest.mark.parametrize("factor", [np.nan, -1.0])
-def test_slopes_that_lie_are_replaced_by_sampling(factor):
+def test_slopes_that_lie_are_replaced_by_sampling(factor, monkeypatch):
+    monkeypatch.setattr(evolution, "serves", lambda size: False)
     posed = problem(cb2, slopes=lambda z: factor * differences(cb2)(z))
     iterates = list(descend(posed, begin(posed, np.array([4.0, -4.0])), 40))
     assert "sampling" in {one.how for one in iterates}
     assert iterates[-1].value < 2.3
+
+
+def stairs(x):
+    """Return the narrow valley in stairs of a quarter, flat between them, so slopes say nothing; least 0 at (1, 1)."""
+    return np.floor(4 * rosenbrock(x)) / 4
+
+
+@pytest.mark.packages("cma")
+@pytest.mark.parametrize("lying", [stairs, lambda x: -rosenbrock(x)])
+def test_slopes_that_lie_are_replaced_by_cma_es(lying):
+    """Down to the lowest stair, or to a thousandth along the valley; twice the same with one seed."""
+    costs = stairs if lying is stairs else rosenbrock
+    posed = problem(costs, worst=False, slopes=differences(lying))
+    iterates = list(descend(posed, begin(posed, np.array([-3.0, 4.0])), 40))
+    assert "evolution" in {one.how for one in iterates}
+    assert iterates[-1].value <= 1e-3
+    again = list(descend(posed, begin(posed, np.array([-3.0, 4.0])), 40))
+    assert [one.data() for one in again] == [one.data() for one in iterates]
+
+
+@pytest.mark.packages("cma")
+def test_cma_es_keeps_conditions_and_what_is_allowed():
+    """In a <= 0.5 and b <= 0.2 the least of the stairs is that of a fine grid there."""
+    posed = problem(
+        stairs, worst=False, slopes=lambda z: np.full((1, 2), np.nan), conditions=lambda z: np.array([0.5 - z[0]]),
+        allowed=lambda z: z[1] <= 0.2,
+    )  # fmt: skip
+    iterates = list(descend(posed, begin(posed, np.array([-1.0, -1.0])), 40))
+    grid = np.stack(np.meshgrid(np.linspace(-5, 0.5, 1101), np.linspace(-5, 0.2, 1041)), -1).reshape(-1, 2)
+    assert all(one.z[0] <= 0.5 + 1e-9 and one.z[1] <= 0.2 for one in iterates[1:])
+    assert iterates[-1].value == stairs(grid).min()
 
 
 def test_costs_fall_and_never_rise():

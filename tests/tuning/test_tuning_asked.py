@@ -4,12 +4,14 @@ import dataclasses
 import math
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 
 import casadi_gnc as gnc
 from casadi_gnc.checks import Verdict
 from casadi_gnc.errors import GncError
+from casadi_gnc.laws.attitude_pd import AttitudePD
 from casadi_gnc.laws.mrp_feedback import MrpFeedback
 from casadi_gnc.tuning.conditions import conditions_of, new_troubles
 from casadi_gnc.tuning.costs import cost_of, from_record
@@ -141,6 +143,60 @@ def test_conditions_that_cannot_hold_together_are_named(funnel):
     gains = gains_free(funnel, "funnel_pinv", ["rate_gain=1.9:2.1"])
     with pytest.raises(GncError, match=r"gains\.theorem1\.filter cannot hold with rate_gain from 1\.9 to 2\.1"):
         conditions_of(funnel, "funnel_pinv", gains, every=True)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class AtOdds(AttitudePD):
+    """A law whose conditions ask for a fast rate loop and for a quiet one; `far` adds one that holds with either."""
+
+    far: Any = gnc.gain("-", "whether the third is there", symbol="n", minimum=0.0)
+
+    def checks(self):
+        def told(name, value, least):
+            return gnc.Check(name, value, least, "N m s", "note", "", "", at_least=True)
+
+        yield told("gains.fast", self.rate_gain, 20.0 if self.far else 30.0)
+        yield told("gains.quiet", -self.rate_gain, -30.0 if self.far else -10.0)
+        if self.far:
+            yield told("gains.far", abs(self.rate_gain - 25.0), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("far", "told"),
+    [
+        (0.0, r"^gains\.fast and gains\.quiet cannot both hold with rate_gain from 5 to 60; widen the bounds"),
+        (1.0, r"gains\.fast, gains\.quiet, gains\.far hold in pairs and not all together with rate_gain from 5 to 60"),
+    ],
+)
+def test_conditions_of_which_two_conflict_are_both_named(slew, far, told):
+    """At least 30 and at most 10; then 20 to 30 without 15 to 35, of which any two leave a range."""
+    law = AtOdds(attitude_gain=4.0, rate_gain=18.0, far=far, body=slew.scheme("pd").law.body)
+    with pytest.raises(GncError, match=told):
+        gnc.tune(slew.with_scheme("pd", law=law), ["rate_gain=5:60"], conditions="all")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Stairs(AttitudePD):
+    """A law whose gains take effect in stairs, so that no slope by them says anything."""
+
+    def command(self, t, y, m):
+        now = self.inputs.split(y)
+        return -ca.floor(4 * self.attitude_gain) / 4 * now.mrp - ca.floor(self.rate_gain) * now.rate
+
+
+@pytest.mark.slow
+@pytest.mark.packages("cma")
+def test_gains_without_slopes_come_to_the_cost_that_slopes_find_without_stairs(slew):
+    short = slew.with_timing(duration=40.0)
+    costs = []
+    for kind, gains in ((AttitudePD, (1.25, 54.0)), (Stairs, (1.4, 54.2))):  # of the same effect
+        law = kind(attitude_gain=gains[0], rate_gain=gains[1], body=slew.scheme("pd").law.body)
+        found = gnc.tune(
+            short.with_scheme("pd", law=law), ["attitude_gain", "rate_gain"], cost="integral(mrp)", iterations=8
+        )
+        costs.append(found.cost_after)
+        assert ("evolution" in [how for _, how in found.course]) is (kind is Stairs)
+    assert costs[1] == pytest.approx(costs[0], rel=0.01)
 
 
 def test_poles_of_a_turn_are_those_of_its_quadratic(slew):
