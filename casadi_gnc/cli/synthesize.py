@@ -23,7 +23,8 @@ def synthesize(
         str, typer.Argument(autocompletion=completing.problems, help="A synthesis file, or the name of a shipped one.")
     ],
     backend: Annotated[
-        str | None, typer.Option(help="clarabel, scs, barrier or ./file.py:NAME, instead of the file's.")
+        str | None,
+        typer.Option(help="clarabel, scs, barrier or ./file.py:NAME, instead of the file's; by size if none is named."),
     ] = None,
     time_limit: Annotated[
         float, typer.Option(min=0.0, help="Seconds after which the search ends without an answer; 0: none.")
@@ -59,6 +60,8 @@ def synthesize(
         print_json(found)
     else:
         _print(case.title or case.name, found)
+        if backend is None and case.backend is None and found["backend"] == "barrier":
+            typer.echo("solved by barrier, the faster back end for so many unknowns; --backend takes another")
         if written:
             typer.echo(written)
     if not found["certified"]:
@@ -84,7 +87,8 @@ def _tell(case: SynthesisCase, backend: str | None, seconds: float) -> None:
     given = getattr(case.recipe, "gamma", None) is not None
     verb = "solving with the bound that is given" if given else "looking for gains"
     until = f"; ends after {seconds:g} s (--time-limit)" if seconds else ""
-    tell(f"{case.name}: {verb}{size} by {backend or case.backend}{until}")
+    asked = backend or case.backend
+    tell(f"{case.name}: {verb}{size}{'' if asked is None else f' by {asked}'}{until}")
 
 
 def _print(title: str, found: dict[str, Any]) -> None:

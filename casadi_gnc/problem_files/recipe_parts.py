@@ -37,7 +37,7 @@ class Recipe(Part):
         return read
 
     def run(self, backend: Any) -> Synthesis | LmiAnswer:
-        """Return what was found by a back end (its name, or itself), certified."""
+        """Return what was found by a back end (its name, or itself; None for one by size), certified."""
         raise TypeError(f"{type(self).__name__} defines no run")
 
     def arguments(self) -> dict[str, Any]:

@@ -30,7 +30,9 @@ class SynthesisModel(Part):
     kind: Literal["synthesis"]
     title: str = ""
     source: str = ""
-    backend: str = Field(default="clarabel", description='clarabel, scs, barrier, or "./file.py:NAME"')
+    backend: str | None = Field(
+        default=None, description='clarabel, scs, barrier, or "./file.py:NAME"; by size if left out'
+    )
     recipe: dict[str, Any] = Field(description="type names the recipe, the other keys are its own")
 
 
@@ -39,7 +41,7 @@ _SINGULAR = "on the way a matrix of the recipe was singular to rounding; look fo
 
 @dataclass(frozen=True, eq=False)
 class SynthesisCase:
-    """Hold what a synthesis file describes: the recipe with its matrices, and the back end."""
+    """Hold what a synthesis file describes: the recipe with its matrices, and the back end, None for one by size."""
 
     document: Document
     name: str
@@ -59,7 +61,7 @@ def load_synthesis(problem: str | Path) -> SynthesisCase:
         recipe = _recipe(table, complaints)
     if model is not None:
         with complaints.about("backend"):
-            backend = backends.REGISTRY.find(model.backend, document.folder)
+            backend = None if model.backend is None else backends.REGISTRY.find(model.backend, document.folder)
     complaints.settle()
     assert model is not None
     assert recipe is not None
@@ -149,7 +151,7 @@ def out_of_time(case: SynthesisCase, backend: Any, seconds: float) -> dict[str, 
 
 
 def _unanswered(case: SynthesisCase, backend: Any, sentence: str) -> dict[str, Any]:
-    named = backend or case.backend
+    named = backend or case.backend or "by size"
     return {
         "problem": case.name,
         "status": "UNDECIDED",

@@ -138,13 +138,13 @@ class Lmis:
         return self._data
 
     def solve(
-        self, backend: Any = "clarabel", *, conflict: bool = True, within: Reach | None = None, **options: Any
+        self, backend: Any = None, *, conflict: bool = True, within: Reach | None = None, **options: Any
     ) -> LmiAnswer:
         """Return the certified answer.
 
         Parameters
         ----------
-        backend : name, see `casadi_gnc.synthesis.backends`, or a module of your own like those.
+        backend : name, see `casadi_gnc.synthesis.backends`, or a module of your own like those; by size if left out.
         conflict : whether to seek a smallest set of conflicting constraints if there is no point.
         within : range that a proof of infeasibility must cover: a bound on the entries of all unknowns, in their
             units, or one by name. By default it must hold for all unknowns, but for the last digits of the
@@ -174,7 +174,7 @@ class Lmis:
     def attempt(
         self,
         data: ConicData,
-        backend: Any = "clarabel",
+        backend: Any = None,
         *,
         within: Reach | None = None,
         prove: bool = True,
@@ -189,6 +189,7 @@ class Lmis:
             it they end the search undecided, for a caller who asks for the proof later.
         """
         scaled = first_scaling(data)
+        backend = backends.by_size(len(data.cost)) if backend is None else backend
         looks = Looks(backends.module(backend), within, prove, options)
         try:
             look = looks.best(scaled)

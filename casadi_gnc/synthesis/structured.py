@@ -81,7 +81,7 @@ def mu_bounds(
     *,
     relative: float = 1e-4,
     starts: int = 12,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> MuBounds:
     """Return bounds on the structured singular value of a matrix.

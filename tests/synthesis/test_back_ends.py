@@ -1,5 +1,6 @@
 """Three solvers, one verdict; and no lie survives the certificate."""
 
+import os
 from types import SimpleNamespace
 
 import casadi as ca
@@ -159,3 +160,37 @@ def test_bad_units_are_scaled_away(backend):
     # [[sqrt 2, sqrt 2 - 1], [., sqrt 2 - 1]] solves A'P + PA + I = PBB'P
     truth = 1e-3 * (2 * 2**0.5 - 1)
     assert np.trace(answer["P"]) == pytest.approx(truth, rel=1e-4)
+
+
+class PanicException(BaseException):
+    pass
+
+
+@pytest.mark.parametrize("panics", [True, False])
+def test_the_words_of_a_panic_are_nobodys(panics, monkeypatch, capfd):
+    """Rust prints them beside Python; what else was printed meanwhile is not lost."""
+
+    def solve():
+        os.write(2, b"thread panicked\n")
+        if panics:
+            raise PanicException
+        return SimpleNamespace(x=[0.0], z=[0.0], status="Unsolved", iterations=0, solve_time=0.0)
+
+    monkeypatch.setattr("clarabel.DefaultSolver", lambda *_: SimpleNamespace(solve=solve))
+    lmis = Lmis()
+    lmis.psd(lmis.scalar("g"), margin=1.0)
+    assert lmis.solve("clarabel").status is LmiStatus.UNDECIDED
+    told = capfd.readouterr()
+    assert told.out == ""
+    assert ("thread panicked" in told.err) is not panics
+
+
+def test_a_back_end_is_taken_by_size():
+    """Of x' = A x + B u with many unknowns the one whose work grows least, else the one that is seldom undecided."""
+    small, large = Lmis(), Lmis()
+    for lmis, size in ((small, 19), (large, 20)):  # 190 and 210 unknowns
+        X = lmis.symmetric("X", size)
+        lmis.psd(X - np.eye(size), margin=1e-6)
+        lmis.minimize(ca.trace(X))
+    assert small.attempt(small.data(), max_iterations=1).backend == "clarabel"
+    assert large.attempt(large.data(), max_iterations=1).backend == "barrier"

@@ -7,6 +7,8 @@ A back end is a module with
 
 `Found` is what the solver says; nothing of it is believed: `casadi_gnc.synthesis.certificate`
 recomputes everything from the data in original units.
+
+Where no back end is named, `by_size` names one.
 """
 
 from __future__ import annotations
@@ -22,7 +24,10 @@ from casadi_gnc.errors import SynthesisError
 from casadi_gnc.registry import Registry
 from casadi_gnc.synthesis.scaling import Scaled
 
-__all__ = ["REGISTRY", "BackEnd", "Claim", "Found", "module", "names"]
+__all__ = ["REGISTRY", "BackEnd", "Claim", "Found", "by_size", "module", "names"]
+
+#: Unknowns beyond which `barrier`, whose Newton equations are least squares in the unknowns, is the faster one.
+_MANY = 200
 
 
 class Claim(Enum):
@@ -78,6 +83,11 @@ REGISTRY = Registry(
 def names() -> list[str]:
     """Return the names of all back ends, installed or not."""
     return REGISTRY.names()
+
+
+def by_size(count: int) -> str:
+    """Return the name of the back end that is taken for so many unknowns where none is asked for."""
+    return "barrier" if count > _MANY else "clarabel"
 
 
 def module(name: Any) -> Any:

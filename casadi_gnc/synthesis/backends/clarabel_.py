@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from casadi_gnc.synthesis.backends import Claim, Found
 from casadi_gnc.synthesis.conic import Kind
 from casadi_gnc.synthesis.scaling import Scaled
+from casadi_gnc.system import held_back
 
 REQUIRES = ("clarabel",)
 _LARGE = 100  # unknowns from which a factorisation by blocks is the faster one
@@ -57,11 +58,15 @@ def solve(scaled: Scaled, *, tolerance: float = 1e-10, max_iterations: int = 200
         [cones[block.kind](block.size) for block in scaled.data.blocks],
         settings,
     )
-    try:
-        solution = solver.solve()
-    except BaseException as error:  # its eigenvalues may fail on hopeless data: a panic, which is no Exception
-        if type(error).__name__ != "PanicException":
-            raise
+    with held_back.standard_error() as told:
+        try:
+            solution = solver.solve()
+        except BaseException as error:  # its eigenvalues may fail on hopeless data: a panic, which is no Exception
+            if type(error).__name__ != "PanicException":
+                raise
+            told.drop()  # Rust's words of it; ours are those of an answer that says nothing
+            solution = None
+    if solution is None:
         return Found(np.full(count, np.nan), np.full(len(scaled.right), np.nan), Claim.NOTHING)
     return Found(
         point=np.array(solution.x),

@@ -47,7 +47,7 @@ def input_ellipsoid(
     damping: float | None = None,
     disc_rad_s: Sequence[float] | None = None,
     margin: float = 1e-7,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return K, (m, n), for u = -K x that decays as asked and uses the smallest part of the limit.

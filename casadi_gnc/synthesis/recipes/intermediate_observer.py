@@ -81,7 +81,7 @@ def intermediate_observer(
     largest_gamma: float = 1e4,
     vertices: Any = None,
     limit: float | None = None,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return K, (m, n), and L, (n, n), with the smallest certified gamma for a given s.

@@ -61,7 +61,7 @@ def mixed_state_feedback(
     disc_rad_s: Sequence[float] | None = None,
     vertices: Any = None,
     limit: float | None = None,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return K, (m, n), for u = -K x with the smallest bound on the H2 norm from w2 to z2.

@@ -49,7 +49,7 @@ def observer(
     decay_1_s: float | None = None,
     damping: float | None = None,
     disc_rad_s: Sequence[float] | None = None,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return L, (n, r), for estimate' = A estimate + known + L (y - C estimate).

@@ -64,7 +64,7 @@ def output_feedback(
     disc_rad_s: Sequence[float] | None = None,
     vertices: Any = None,
     limit: float | None = None,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return K, (m, r), for u = -K y, with the smallest norm from w to z that descent from several starts finds.

@@ -62,7 +62,7 @@ def polytope_state_feedback(
     decay_1_s: float | None = None,
     damping: float | None = None,
     disc_rad_s: Sequence[float] | None = None,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return gains with the smallest bound on the norm from w to z that holds for every plant between the vertices.

@@ -49,7 +49,7 @@ def saturation_margin(
     relative: float = 1e-4,
     margin: float = 1e-7,
     largest: float = 1e4,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return the gain K as it was given, and the largest share of its command that saturation may take.

@@ -85,7 +85,7 @@ def theorem1(
     *,
     price: float = 0.0,
     margin: float = 1e-6,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> LmiAnswer:
     """Return the answer to (24) to (26), each negative definite by the margin, with gamma_2 minimised.

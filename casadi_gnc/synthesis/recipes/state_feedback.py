@@ -55,7 +55,7 @@ def state_feedback(
     disc_rad_s: Sequence[float] | None = None,
     vertices: Any = None,
     limit: float | None = None,
-    backend: Any = "clarabel",
+    backend: Any = None,
     **options: Any,
 ) -> Synthesis:
     """Return K, (m, n), for u = -K x with the smallest norm from w to z.
