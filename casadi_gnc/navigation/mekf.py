@@ -48,7 +48,8 @@ import casadi as ca
 from casadi_gnc.errors import LawError
 from casadi_gnc.mathematics.exact import array, is_number
 from casadi_gnc.mechanics import quaternions
-from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, Sensor, StarTracker, SunSensor
+from casadi_gnc.mechanics.sensor import Sensor
+from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, StarTracker, SunSensor
 from casadi_gnc.navigation._navigation import Estimator
 from casadi_gnc.navigation.square_root import Factors
 from casadi_gnc.signals import Layout, Signal

@@ -279,7 +279,7 @@ def test_metrics_of_claims_are_those_of_missions_without_a_name(tmp_path, more, 
     ],
 )
 def test_arguments_of_computations_are_checked_when_read(tmp_path, arguments, message):
-    text = CUBE.format(printed=1.0, name="shi2020.disturbance_error")
+    text = CUBE.format(printed=1.0, name="shi2020_docking.disturbance_error")
     path = tmp_path / "claims.toml"
     path.write_text(HEAD + text.replace(" }", f", arguments = {{ {arguments} }} }}"))
     with pytest.raises(ProblemError, match=r"claims.toml, line \d+, claim\[1\]") as caught:

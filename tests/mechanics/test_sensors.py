@@ -8,7 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from casadi_gnc.errors import FlightError
-from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, Sensor, StarTracker, SunSensor, Tachometers
+from casadi_gnc.mechanics.sensor import Sensor
+from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, StarTracker, SunSensor, Tachometers
 
 HOLD = 0.1
 COUNT = 10000

@@ -1,6 +1,6 @@
 """Named computations that answer claims which no flight answers: numbers from numbers.
 
-A module of this room is a paper; its public functions take plain data and return a float. A
+A module of this room is a paper, or the flights of one; its public functions take plain data and return a float. A
 computation's name in a claims file is `module.function`.
 """
 
@@ -12,16 +12,16 @@ from importlib import import_module
 
 __all__ = ["COMPUTATIONS"]
 
-_PAPERS = ("huang2019", "huang2020", "shi2020", "sun2018", "tao2019")
+_MODULES = ("huang2019", "huang2020", "shi2020", "shi2020_docking", "sun2018", "tao2019")
 
 
 def _collect() -> dict[str, Callable[..., float]]:
     found: dict[str, Callable[..., float]] = {}
-    for paper in _PAPERS:
-        module = import_module(f"{__name__}.{paper}")
+    for origin in _MODULES:
+        module = import_module(f"{__name__}.{origin}")
         for name, function in inspect.getmembers(module, inspect.isfunction):
             if not name.startswith("_") and function.__module__ == module.__name__:
-                found[f"{paper}.{name}"] = function
+                found[f"{origin}.{name}"] = function
     return found
 
 

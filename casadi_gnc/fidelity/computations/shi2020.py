@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.integrate import trapezoid
 from scipy.optimize import linprog
 
-import casadi_gnc
-from casadi_gnc.errors import FlightError
-from casadi_gnc.missions.flight import Flight
-from casadi_gnc.missions.metrics import settled
-from casadi_gnc.problem_files.synthesis_file import load_synthesis
+from casadi_gnc.fidelity.computations.shi2020_data import printed_gains, printed_matrices, problem_data
 from casadi_gnc.synthesis import Lmis, LmiStatus, Norm, h_infinity_norm, peak_command, poles, stable_ratios
 from casadi_gnc.synthesis.analysis import gain_at
 from casadi_gnc.synthesis.recipes.intermediate_observer import by_mass_ratio, closed_loop
@@ -23,41 +17,11 @@ from casadi_gnc.synthesis.recipes.shi2020_theorem1 import left_sides, theorem1
 
 #: Half a unit of the last printed digit of X1, X3, W and H.
 _HALF_DIGIT = 5e-5
-_MISSION = "shi2020/docking_as_printed"
-
-
-def _axis(matrix: list[list[float]]) -> np.ndarray:
-    """Return a matrix that acts on every axis alike, from its entries for position and velocity."""
-    return np.kron(np.array(matrix), np.eye(3))
-
-
-def _printed() -> dict[str, Any]:
-    """Return X1, X3, W and H of section 4.A."""
-    across = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
-    return {
-        "X1": _axis([[0.0084, -0.0033], [-0.0033, 0.0100]]),
-        "X3": 1.5547 * np.eye(3),
-        "W": _axis([[0.1293, 0.3067]]) + np.kron([[-0.0001, 0.0003]], across),
-        "H": _axis([[0.0236, 0.0023], [0.0074, 0.0354]]),
-    }
-
-
-@cache
-def _data() -> dict[str, Any]:
-    """Return what (24) to (26) are given."""
-    given = load_synthesis("shi2020/as_printed").recipe.arguments()
-    return {name: value for name, value in given.items() if name not in ("price", "margin")}
-
-
-def _gains() -> tuple[np.ndarray, np.ndarray]:
-    """Return the printed K, (3, 6), and L, (6, 6)."""
-    law: Any = casadi_gnc.load(_MISSION).scheme("iobc").law
-    return np.array(law.controller_gain), np.array(law.observer_gain)
 
 
 def _left(name: str, gamma2: float = 1.0) -> np.ndarray:
     """Return the left side of an inequality at the printed matrices."""
-    sides = left_sides(**_data(), **_printed(), gamma2=gamma2)
+    sides = left_sides(**problem_data(), **printed_matrices(), gamma2=gamma2)
     return np.array(ca.evalf(sides[name]))
 
 
@@ -107,10 +71,10 @@ def start_level_bound() -> float:
 
 
 def _level(doubt: float) -> float:
-    one, two, three = _data()["start"]
+    one, two, three = problem_data()["start"]
     total = 0.0
     for name, weight in (("X1", one**2 + two**2), ("X3", three**2)):
-        X = _printed()[name]
+        X = printed_matrices()[name]
         ones = np.ones(len(X))
         total += weight * float(ones @ np.linalg.solve(X + len(X) * doubt * np.eye(len(X)), ones))
     return total
@@ -128,7 +92,7 @@ def input_eigenvalue_bound() -> float:
 
 @cache
 def _solved() -> LmiStatus:
-    return theorem1(**_data(), conflict=False).status
+    return theorem1(**problem_data(), conflict=False).status
 
 
 def has_solution() -> float:
@@ -146,7 +110,7 @@ def guaranteed_limit() -> float:
 
     One axis of the double integrator stands for the three: the orbit's terms are 1e-6.
     """
-    data, mass = _data(), 1 / _data()["B"][3, 0]
+    data, mass = problem_data(), 1 / problem_data()["B"][3, 0]
     alpha = data["alpha"] / 3
     axis = {
         "A": np.array([[0.0, 1.0], [0.0, 0.0]]),
@@ -166,12 +130,12 @@ def guaranteed_limit() -> float:
 
 def guaranteed_limit_bound() -> float:
     """Return the force limit, [N], below which (26) has no solution: k0 must exceed kappa_3^2."""
-    return float(_data()["kappa3"] * math.sqrt(_data()["alpha"] + 1))
+    return float(problem_data()["kappa3"] * math.sqrt(problem_data()["alpha"] + 1))
 
 
 def gain_from_matrices(gain: str, row: int, column: int) -> float:
     """Return an entry of K = W X1^-1 or L = H (C X1)^-1 of the printed matrices; rows and columns from 1."""
-    matrix = np.linalg.solve(_printed()["X1"], _printed()["W" if gain == "K" else "H"].T).T
+    matrix = np.linalg.solve(printed_matrices()["X1"], printed_matrices()["W" if gain == "K" else "H"].T).T
     return float(matrix[row - 1, column - 1])
 
 
@@ -180,7 +144,7 @@ def gains_misfit() -> float:
 
     At most 1: some X1, W and H that round to the printed ones give the printed gains.
     """
-    (K, L), printed = _gains(), _printed()
+    (K, L), printed = printed_gains(), printed_matrices()
     X1, W, H = (printed[name] for name in ("X1", "W", "H"))
     near = X1[0, 0], X1[0, 3], X1[3, 3]
     rows, right = list(np.eye(3)), list(near)  # unknowns: the entries (1,1), (1,2) and (2,2) of X1
@@ -201,7 +165,7 @@ def optimality() -> float:
     """
     lmis = Lmis()
     H, gamma2 = lmis.rectangular("H", 6, 6), lmis.scalar("gamma_2")
-    sides = left_sides(**_data(), **{**_printed(), "H": H}, gamma2=gamma2)
+    sides = left_sides(**problem_data(), **{**printed_matrices(), "H": H}, gamma2=gamma2)
     lmis.nsd(sides["(24) performance"], margin=1e-6, name="performance")
     lmis.minimize(gamma2)
     return _least_gamma2() / float(lmis.solve()["gamma_2"][0, 0])
@@ -209,16 +173,16 @@ def optimality() -> float:
 
 def noise_matrix_entry(row: int, column: int) -> float:
     """Return an entry of P2 L, which M0 must equal if e'P2 L v >= e'M0 v for all e and v; from 1."""
-    _, L = _gains()
-    return float(np.linalg.solve(_printed()["X1"], L)[row - 1, column - 1])
+    _, L = printed_gains()
+    return float(np.linalg.solve(printed_matrices()["X1"], L)[row - 1, column - 1])
 
 
 # The loop (23) without a clip.
 
 
 def _plant() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
-    data = _data()
-    return data["A"], data["B"], data["C"], *_gains(), data["varpi"]
+    data = problem_data()
+    return data["A"], data["B"], data["C"], *printed_gains(), data["varpi"]
 
 
 def slowest_pole(mass_ratio: float) -> float:
@@ -243,7 +207,7 @@ def unstable_mass_ratio(mass_ratio: float) -> float:
 def _norm() -> tuple[Norm, float]:
     """Return the norm from (v, w') to y = C eta + v, and the singular value attained at its frequency."""
     loop, inputs = closed_loop(*_plant())
-    C = np.hstack([_data()["C"], np.zeros((6, 9))])
+    C = np.hstack([problem_data()["C"], np.zeros((6, 9))])
     D = np.hstack([np.eye(6), np.zeros((6, 3))])
     norm = h_infinity_norm(loop, inputs, C, D)
     return norm, gain_at(loop, inputs, C, D, norm.frequency_rad_s)
@@ -261,14 +225,14 @@ def norm_ratio_bound() -> float:
 
 def linear_peak(position_m: list[float]) -> float:
     """Return the largest norm of u, [N], at the mass m0 from rest at a position, both estimates from zero."""
-    (K, _), (fixed, scaled) = _gains(), by_mass_ratio(*_plant())
+    (K, _), (fixed, scaled) = printed_gains(), by_mass_ratio(*_plant())
     start = np.concatenate([position_m, np.zeros(12)])
     return peak_command(fixed + scaled, np.hstack([np.zeros((3, 6)), -K, -np.eye(3)]), start[None]).value
 
 
 def command_at_level() -> float:
     """Return the largest norm of u, [N], where V <= alpha and |xi| <= kappa_3, at the printed matrices."""
-    (K, _), data, printed = _gains(), _data(), _printed()
+    (K, _), data, printed = printed_gains(), problem_data(), printed_matrices()
     reach = K + data["varpi"] * data["B"].T  # u = -reach (eta - e_eta) - xi + e_xi
     X1, X3 = printed["X1"], printed["X3"]
     return math.sqrt(data["alpha"] * _largest(2 * reach @ X1 @ reach.T + X3)) + data["kappa3"]
@@ -277,83 +241,6 @@ def command_at_level() -> float:
 def command_at_start(position_m: list[float]) -> float:
     """Return the norm of u, [N], at rest at a position that is known, w = 0: a state with V <= alpha and xi = 0."""
     eta = np.concatenate([position_m, np.zeros(3)])
-    if eta @ np.linalg.solve(_printed()["X1"], eta) > _data()["alpha"]:
+    if eta @ np.linalg.solve(printed_matrices()["X1"], eta) > problem_data()["alpha"]:
         return 0.0
-    return float(np.linalg.norm(_gains()[0] @ eta))
-
-
-# Flights.
-
-
-@cache
-def _flown(scheme: str) -> Flight:
-    return casadi_gnc.fly(casadi_gnc.load(_MISSION), scheme, engine="vm")
-
-
-def _error(signal: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [s] and the error of the estimate of a signal, (N, 3)."""
-    flight = _flown("iobc")
-    true = "lumped_disturbance" if signal == "disturbance" else signal
-    return flight.time, flight[true] - flight[f"{signal}_estimate"]
-
-
-def estimate_settling(signal: str, threshold: float) -> float:
-    """Return the time, [s], after which the norm of an estimate's error stays below a threshold."""
-    time, error = _error(signal)
-    found = settled(time, np.linalg.norm(error, axis=1), threshold)
-    if found is None:
-        raise FlightError(f"the error of the {signal} does not settle below {threshold:g}")
-    return found
-
-
-def disturbance_error(after_s: float) -> float:
-    """Return the largest norm of w - w_hat after a time, [N]."""
-    time, error = _error("disturbance")
-    return float(np.linalg.norm(error[time > after_s], axis=1).max())
-
-
-def utilisation(scheme: str) -> float:
-    """Return the integral of |u|/30 N over the flight, [s]."""
-    flight = _flown(scheme)
-    return float(trapezoid(np.linalg.norm(flight["limited"], axis=1), flight.time) / _data()["limit"])
-
-
-def mean_utilisation(scheme: str) -> float:
-    """Return the time mean of |u|/30 N, in percent."""
-    return 100 * utilisation(scheme) / float(_flown(scheme).time[-1])
-
-
-def distance_ratio() -> float:
-    """Return the least ratio of the chaser's to the target's distance from their centre of mass."""
-    flight = _flown("iobc")
-    chaser, target = (np.linalg.norm(flight[f"{name}_position"], axis=1) for name in ("chaser", "target"))
-    return float(np.min(chaser / target))
-
-
-def overshoot() -> float:
-    """Return by how much the chaser passes the target along an axis, [m]."""
-    return float(-(_flown("iobc")["position"] * np.sign(_flown("iobc")["position"][0])).min())
-
-
-def _intermediate() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return eta - eta_hat, (N, 6), xi, (N, 3), and xi - xi_hat, (N, 3), of (13) and (18)."""
-    flight, data = _flown("iobc"), _data()
-    eta_error = np.hstack([_error("position")[1], _error("velocity")[1]])
-    eta = np.hstack([flight["position"], flight["velocity"]])
-    through = data["varpi"] * data["B"]
-    return eta_error, flight["lumped_disturbance"] - eta @ through, _error("disturbance")[1] - eta_error @ through
-
-
-def intermediate_peak() -> float:
-    """Return the largest norm of xi = w - varpi B'eta, [N]."""
-    return float(np.linalg.norm(_intermediate()[1], axis=1).max())
-
-
-def lyapunov_peak() -> float:
-    """Return the largest V of (27), with the printed X1 and X3."""
-    flight = _flown("iobc")
-    eta_error, _, xi_error = _intermediate()
-    eta = np.hstack([flight["position"], flight["velocity"]])
-    P1, P3 = (np.linalg.inv(_printed()[name]) for name in ("X1", "X3"))
-    terms = ((eta, P1), (eta_error, P1), (xi_error, P3))
-    return float(np.max(sum(np.einsum("ti,ij,tj->t", e, P, e) for e, P in terms)))
+    return float(np.linalg.norm(printed_gains()[0] @ eta))

@@ -25,7 +25,7 @@ from casadi_gnc.mechanics.multibody import Assembly, Component
 from casadi_gnc.mechanics.orbits import EARTH_J2, Orbit
 from casadi_gnc.mechanics.reaction_wheels import TorqueGyrostat, WheelArray
 from casadi_gnc.mechanics.rigid_body import RigidBody
-from casadi_gnc.mechanics.sensors import Sensor
+from casadi_gnc.mechanics.sensor import Sensor
 from casadi_gnc.missions.actuation import Actuation, Actuators
 from casadi_gnc.missions.craft import Craft, EffortKeys
 from casadi_gnc.missions.mission import Mission

@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from casadi_gnc.mechanics.geomagnetic import DEGREE as HIGHEST
-from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, Sensor, StarTracker, SunSensor
+from casadi_gnc.mechanics.sensor import Sensor
+from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, StarTracker, SunSensor
 from casadi_gnc.navigation import Estimator, Mekf
 from casadi_gnc.tables.part import NonNegative, Part, Positive
 

@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from casadi_gnc.errors import FlightError
-from casadi_gnc.mechanics.sensors import LATEST, Gyro, Magnetometer, Sensor, StarTracker, SunSensor, Tachometers
+from casadi_gnc.mechanics.sensor import LATEST, Sensor
+from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, StarTracker, SunSensor, Tachometers
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive, Vector
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from casadi_gnc.errors import FlightError
-from casadi_gnc.mechanics.sensors import Sensor
+from casadi_gnc.mechanics.sensor import Sensor
 from casadi_gnc.missions.timing import Timing
 from casadi_gnc.tables.part import MisfitError
 
