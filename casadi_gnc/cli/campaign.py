@@ -9,7 +9,7 @@ import typer
 
 from casadi_gnc.cli import completing
 from casadi_gnc.cli.campaign_summary import print_summary
-from casadi_gnc.cli.manners import Ending, Figures, Format, print_json, tell
+from casadi_gnc.cli.manners import Ending, Figures, Format, Report, page, print_json, tell
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def campaign(
     ] = None,
     figures: Figures = None,
     ending: Format = Ending.png,
-    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
+    report: Report = None,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
     confidence: Annotated[float, typer.Option(help="Of the bounds that are told.")] = 0.9,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
@@ -69,10 +69,9 @@ def campaign(
     from casadi_gnc.campaigns.keeping import FOLDER, Keep
     from casadi_gnc.errors import CampaignError
     from casadi_gnc.problem_files import by_name
-    from casadi_gnc.reports.endings import check_page
 
-    if report is not None:
-        check_page(report)
+    own = out or Path("out") / f"{Path(problem).stem}-campaign"
+    report = page(report, folder if problem == "show" and folder is not None else own)
     if problem == "show":
         if folder is None:
             raise CampaignError("which campaign? give its folder: casadi-gnc campaign show FOLDER")
@@ -92,7 +91,7 @@ def campaign(
             scheme=scheme,
             plan=plan,
             seed=seed,
-            out=out or Path("out") / f"{Path(problem).stem}-campaign",
+            out=own,
             shard=parts_of(shard),
             audit=audit,
             engine=engine,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import Ending, Figures, Format, print_json
+from casadi_gnc.cli.manners import Ending, Figures, Format, Report, page, print_json
 from casadi_gnc.cli.progress import working
 
 if TYPE_CHECKING:
@@ -31,15 +31,12 @@ def check(
     figures: Figures = None,
     ending: Format = Ending.png,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
-    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
+    report: Report = None,
 ) -> None:
     """Check a problem without flying it; exit code 1 if any check fails."""
     from casadi_gnc.checks import worst
 
-    if report is not None:
-        from casadi_gnc.reports.endings import check_page
-
-        check_page(report)
+    report = page(report, Path(f"{Path(problem).stem}-checks"))
     checked = _checked(problem, scheme)
     title, found = checked.title, checked.checks
     if report is not None:

@@ -66,7 +66,7 @@ COMMANDS = (
         "Better gains, within the law's conditions and the checks.",
         (
             "tune huang2020/detumble --scheme observer_pinv --free rate_gain,observer_gain --out tuned.toml",
-            "tune mission.toml --free attitude_gain=0.1:5 --against worst --out tuned.toml --report tuned.html",
+            "tune mission.toml --free attitude_gain=0.1:5 --against worst --out tuned.toml --report",
         ),
         is_about_a_file=True,
     ),
@@ -74,7 +74,7 @@ COMMANDS = (
         check.check,
         FLY,
         "Tell what would go wrong, before the flight.",
-        ("check huang2020/slew", "check mission.toml --figures figures --report checks.html"),
+        ("check huang2020/slew", "check mission.toml --figures figures --report"),
     ),
     Entry(
         margins.margins,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import Ending, Figures, Format
+from casadi_gnc.cli.manners import Ending, Figures, Format, Report, page
 from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def fly(
     ] = None,
     figures: Figures = None,
     ending: Format = Ending.png,
-    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
+    report: Report = None,
     json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, nothing else.")] = False,
 ) -> None:
     """Fly a mission and write <scheme>.npz, summary.json and mission.json; of sweeps summary.json alone.
@@ -67,17 +67,16 @@ def fly(
     from casadi_gnc.missions.flying import fly as fly_one
     from casadi_gnc.problem_files.loading import load
     from casadi_gnc.problem_files.sweeping import load_sweeps
-    from casadi_gnc.reports.endings import check_page
     from casadi_gnc.system.files import prepare_folder
 
-    if report is not None:
-        check_page(report)
     if case is not None:
         _fly_case(Path(problem), case, out, decimation, figures, ending, json, report)
         return
     mission = load(problem)
     chosen = [mission.scheme(name).name for name in scheme] if scheme else [s.name for s in mission.schemes]
-    folder = prepare_folder(Path("out") / mission.name if out is None else out)
+    folder = Path("out") / mission.name if out is None else out
+    report = page(report, folder)
+    prepare_folder(folder)
     if sweeps := load_sweeps(problem):
         if report is not None or figures is not None:
             raise ReportError("a mission with sweeps keeps no records to draw; fly it without --report and --figures")
@@ -143,7 +142,9 @@ def _fly_case(
 
     found = open_campaign(campaign).case(case)
     mission = found.cases.varied.nominal
-    folder = prepare_folder(Path("out") / f"{mission.name}-case-{found.number}" if out is None else out)
+    folder = Path("out") / f"{mission.name}-case-{found.number}" if out is None else out
+    report = page(report, folder)
+    prepare_folder(folder)
     with Progress(f"case {found.number}", quiet=json) as progress:
         flight = found.fly(decimation=decimation, progress=progress)
     flight.save(folder)

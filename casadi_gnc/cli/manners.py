@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from casadi_gnc.cli import progress
 
@@ -33,6 +33,47 @@ class Ending(str, Enum):
 #: The two options of every command that draws.
 Figures = Annotated[Path | None, typer.Option("--figures", help="Draw pictures into this folder.")]
 Format = Annotated[Ending, typer.Option("--format", help="Of the pictures.")]
+#: The option of every command that writes a page; `page` says which file is meant.
+Report = Annotated[
+    Path | None,
+    typer.Option(
+        "--report", metavar="[FILE]", help="Write a page to look at (.html); without a name beside the results."
+    ),
+]
+#: What stands for the name of a page that was not given.
+_NAMELESS = "<beside the results>"
+
+
+def page(report: Path | None, results: Path) -> Path | None:
+    """Return the page to write: the one that is named, or one beside results, called as they are; None for none.
+
+    Raises
+    ------
+    ReportError
+        For an ending that is no page's.
+    """
+    from casadi_gnc.reports.endings import check_page
+
+    if report is not None and str(report) == _NAMELESS:
+        whole = results if results.name else results.resolve()
+        return whole.with_name(f"{whole.name.removesuffix('.toml')}.html")
+    if report is not None:
+        check_page(report)
+    return report
+
+
+class Paged(TyperCommand):
+    """A command that takes `--report` with the name of a page or without."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse, a bare `--report`, the last word or before another option, with a name that stands for none."""
+        words, told = list(args), "--report"
+        ends = words.index("--") if "--" in words else len(words)
+        if any(told in one.opts for one in self.params):
+            for i in range(ends - 1, -1, -1):
+                if words[i] == told and (i + 1 >= ends or words[i + 1].startswith("-")):
+                    words.insert(i + 1, _NAMELESS)
+        return super().parse_args(ctx, words)
 
 
 @dataclass(frozen=True)
@@ -63,6 +104,7 @@ class Entry:
         command = _named(self.run) if self.is_about_a_file else self.run
         app.command(
             self.name or self.run.__name__,
+            cls=Paged,
             short_help=self.short,
             rich_help_panel=self.heading,
             epilog="\b\nExamples:\n" + "\n".join(f"  {program} {line}" for line in self.examples),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import print_json, tell
+from casadi_gnc.cli.manners import Report, page, print_json, tell
 
 if TYPE_CHECKING:
     from casadi_gnc.tuning.outcome import Moved, Tuned
@@ -60,15 +60,13 @@ def tune(
     plan: Annotated[str, typer.Option(help="Of a campaign, as for `casadi-gnc campaign`.")] = "sobol",
     seed: Annotated[int, typer.Option(min=0, help="Of all that is drawn.")] = 0,
     threads: Annotated[int | None, typer.Option(min=1, help="All cores if left out.")] = None,
-    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
+    report: Report = None,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
     """Tune gains and write them; exit code 1 if none better were found. A run that was killed goes on where it was."""
-    from casadi_gnc.reports.endings import check_page
     from casadi_gnc.tuning.tune import tune as tuned
 
-    if report is not None:
-        check_page(report)
+    report = page(report, out)
     found = tuned(
         problem,
         [each for each in free.split(",") if each.strip()],

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from casadi_gnc.cli import completing
-from casadi_gnc.cli.manners import print_json
+from casadi_gnc.cli.manners import Report, page, print_json
 from casadi_gnc.cli.progress import working
 
 
@@ -21,7 +21,7 @@ def verify(
         ),
     ] = "host",
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
-    report: Annotated[Path | None, typer.Option(help="Write a page to look at into this file (.html).")] = None,
+    report: Report = None,
 ) -> None:
     """Compare a package's words here and on targets, and measure it there; exit code 1 if a word or file differs.
 
@@ -29,10 +29,8 @@ def verify(
     """
     from casadi_gnc.delivery.verifying import verify as run
     from casadi_gnc.embedded import boards
-    from casadi_gnc.reports.endings import check_page
 
-    if report is not None:
-        check_page(report)
+    report = page(report, package)
     wanted = [word.strip() for word in target.split(",") if word.strip()] or ["host"]
     if "all" in wanted:
         wanted = ["host", *boards.names()]

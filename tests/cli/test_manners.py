@@ -2,12 +2,15 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from casadi_gnc.cli.commands import COMMANDS, app
+from casadi_gnc.cli.manners import page
+from casadi_gnc.errors import ReportError
 from casadi_gnc.system import assets
 
 GROUP = typer.main.get_command(app)
@@ -38,6 +41,35 @@ def test_every_command_stands_under_a_heading_with_its_sentence_whole():
         assert "Examples:" in shown
         assert "--quiet" in shown
     assert {command.rich_help_panel for command in GROUP.commands.values()} == {entry.heading for entry in COMMANDS}
+
+
+@pytest.mark.parametrize(
+    ("words", "results", "written"),
+    [
+        ("tune m.toml --free k --out new/tuned.toml --report", "new/tuned.toml", "new/tuned.html"),
+        ("tune m.toml --report --free k --out tuned.toml", "tuned.toml", "tuned.html"),
+        ("tune m.toml --free k --out tuned.toml --report page.html --seed 1", "tuned.toml", "page.html"),
+        ("tune m.toml --free k --out tuned.toml", "tuned.toml", None),
+        ("fly m.toml --report --quiet", "out/m", "out/m.html"),
+        ("fly m.toml --report=a.html", "out/m", "a.html"),
+        ("check m.toml --report --json", "m-checks", "m-checks.html"),
+        ("campaign show mc/ --report", "mc/", "mc.html"),
+        ("verify flight/m --report", "flight/m", "flight/m.html"),
+    ],
+)
+def test_a_page_without_a_name_stands_beside_the_results(words, results, written):
+    name, *rest = words.split()
+    given = GROUP.commands[name].make_context(name, rest).params["report"]
+    assert page(given, Path(results)) == (None if written is None else Path(written))
+
+
+def test_a_page_that_is_named_ends_as_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert page(GROUP.commands["check"].make_context("check", ["m", "--report"]).params["report"], Path()) == (
+        tmp_path.with_name(f"{tmp_path.name}.html")
+    )
+    with pytest.raises(ReportError, match=r"page\.txt has the ending '\.txt'"):
+        page(Path("page.txt"), Path("out"))
 
 
 def test_quiet_leaves_data_and_errors_alone():

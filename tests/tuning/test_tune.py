@@ -70,7 +70,7 @@ def cost_flown(path):
 def test_the_command_writes_better_gains_and_says_what_moved(mission):
     out, page = mission.with_name("nominal.toml"), mission.with_name("nominal.html")
     done = run("tune", str(mission), "--free", "attitude_gain,rate_gain", "--cost", "integral(mrp)",
-               "--iterations", "8", "--threads", "1", "--out", str(out), "--report", str(page), "--json")  # fmt: skip
+               "--iterations", "8", "--threads", "1", "--out", str(out), "--json", "--report")  # fmt: skip
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
     law = tomllib.loads(out.read_text())["scheme"][0]["law"]
