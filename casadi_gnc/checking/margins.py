@@ -185,8 +185,8 @@ def margins(loop: BrokenLoop) -> Margins:
             phase, phase_at = turn, w
             break
     delay = min(((turn % (2 * math.pi)) / w for turn, sense, w in turns if sense < 0), default=math.inf)
-    modulus, _ = _least(grid, np.abs(1 + values), lambda w: abs(1 + value(w)))
-    disk, disk_at = _least(grid, _disk(values), lambda w: float(_disk(value(w))))
+    modulus, _ = least(grid, np.abs(1 + values), lambda w: abs(1 + value(w)))
+    disk, disk_at = least(grid, _disk(values), lambda w: float(_disk(value(w))))
     nearer = low_at if low and 1 / low < high else high_at
     return Margins(low, high, phase, phase_at, nearer, delay, modulus, disk, disk_at)
 
@@ -199,7 +199,7 @@ def disk_of_all(loop: BrokenLoop) -> tuple[float, float]:
         return 2 / np.linalg.norm(np.linalg.solve(one + L, one - L), 2, axis=(-2, -1))
 
     grid = loop.frequencies()
-    return _least(grid, alpha(grid), lambda w: float(alpha(w)))
+    return least(grid, alpha(grid), lambda w: float(alpha(w)))
 
 
 def common_gain(loop: BrokenLoop) -> tuple[float, float]:
@@ -244,7 +244,7 @@ def _crossings(grid: np.ndarray, values: np.ndarray, function: Callable[[float],
     return [float(each) for each in found]
 
 
-def _least(grid: np.ndarray, values: np.ndarray, function: Callable[[float], float]) -> tuple[float, float]:
+def least(grid: np.ndarray, values: np.ndarray, function: Callable[[float], float]) -> tuple[float, float]:
     """Return the least value and its frequency, refined around the least of the grid."""
     from scipy import optimize
 

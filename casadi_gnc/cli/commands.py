@@ -80,7 +80,10 @@ COMMANDS = (
         margins.margins,
         FLY,
         "Gain, phase, delay and disk margins of every loop.",
-        ("margins satellites/slew_and_track", "margins mission.toml --scheme pd --figures figures --format svg"),
+        (
+            "margins satellites/slew_and_track",
+            "margins mission.toml --scheme pd --structured --figures figures --format svg",
+        ),
         is_about_a_file=True,
     ),
     Entry(

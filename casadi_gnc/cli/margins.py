@@ -13,6 +13,7 @@ from casadi_gnc.cli.progress import Progress
 
 if TYPE_CHECKING:
     from casadi_gnc.checking.broken_loops import SchemeMargins
+    from casadi_gnc.checking.structured_disk import StructuredDisk
 
 
 def margins(
@@ -22,6 +23,9 @@ def margins(
     scheme: Annotated[
         list[str] | None, typer.Option(autocompletion=completing.schemes, help="Only this scheme; may be repeated.")
     ] = None,
+    structured: Annotated[
+        bool, typer.Option("--structured", help="Also bounds on mu: the disk that all efforts bear at once.")
+    ] = False,
     figures: Figures = None,
     ending: Format = Ending.png,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
@@ -52,17 +56,22 @@ def margins(
         from casadi_gnc.reports.margins_picture import draw
 
         drawn = draw(mission.title or mission.name, found, prepare_folder(figures) / f"margins.{ending.value}")
+    disks = {}
+    if structured:
+        from casadi_gnc.checking.structured_disk import structured_disk
+
+        disks = {one.scheme: structured_disk(one.loop) for one in found}
     if json:
-        _print_json(mission.title, found, lacking)
+        _print_json(mission.title, found, lacking, disks)
         return
-    _print(mission.title or mission.name, found)
+    _print(mission.title or mission.name, found, disks)
     for sentence in lacking:
         typer.echo(f"note: {sentence}")
     if drawn is not None:
         typer.echo(f"wrote {drawn}")
 
 
-def _print(title: str, found: list[SchemeMargins]) -> None:
+def _print(title: str, found: list[SchemeMargins], disks: dict[str, StructuredDisk]) -> None:
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
@@ -94,6 +103,20 @@ def _print(title: str, found: list[SchemeMargins]) -> None:
             highlight=False,
         )
         console.print(_of_mass_centre(one), markup=False, highlight=False)
+        if one.scheme in disks:
+            console.print(f"{one.scheme}: {_of_disk(disks[one.scheme])}", markup=False, highlight=False)
+
+
+def _of_disk(found: StructuredDisk) -> str:
+    proved = (
+        f"mu proves a disk of {found.proved:.4g} for all efforts at once where it is least, at {found.at:.3g} rad/s"
+    )
+    if not found.factors:
+        return f"{proved}; no factors that break it were found"
+    told = ", ".join(
+        f"{gain:.3g} at {math.degrees(turn):.3g} deg" for gain, turn in zip(found.gains, found.phases, strict=True)
+    )
+    return f"{proved}; with {found.broken:.4g} these factors break it: {told}"
 
 
 def _of_mass_centre(one: SchemeMargins) -> str:
@@ -120,7 +143,7 @@ def _or_any(value: float) -> str:
     return f"{value:.3g}" if math.isfinite(value) else "any"
 
 
-def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> None:
+def _print_json(title: str, found: list[SchemeMargins], lacking: list[str], disks: dict[str, StructuredDisk]) -> None:
     import dataclasses
 
     def number(value: float) -> float | None:
@@ -138,6 +161,17 @@ def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> N
             "why_none": found.why,
         }
 
+    def disk(one: StructuredDisk | None) -> dict[str, Any] | None:
+        if one is None:
+            return None
+        return {
+            "proved": one.proved,
+            "broken": number(one.broken),
+            "at_rad_per_s": one.at,
+            "gains": list(one.gains),
+            "phases_rad": list(one.phases),
+        }
+
     def data(one: SchemeMargins) -> dict[str, Any]:
         channels = {
             name: {key: number(value) for key, value in dataclasses.asdict(m).items()}
@@ -151,6 +185,7 @@ def _print_json(title: str, found: list[SchemeMargins], lacking: list[str]) -> N
             "effort_high": number(one.effort_high),
             "disk_of_efforts": one.disk_of_efforts,
             "mass_centre": centre(one),
+            "structured_disk": disk(disks.get(one.scheme)),
         }
 
     content = {"problem": title, "schemes": [data(one) for one in found], "notes": lacking}

@@ -76,6 +76,20 @@ class MassCentre(TypedDict):
 
 
 @_TOLD
+class StructuredDisk(TypedDict):
+    """Bounds by mu on the disk that all efforts bear at once, where it is least."""
+
+    proved: float
+    """Radius that is borne, by the certified upper bound on mu."""
+    broken: float | None
+    """Radius of the factors below, which bring a pole to the boundary; null where none were found."""
+    at_rad_per_s: float
+    gains: list[float]
+    """Magnitudes of these factors, by effort."""
+    phases_rad: list[float]
+
+
+@_TOLD
 class SchemeMargins(TypedDict):
     """Margins of one scheme."""
 
@@ -88,6 +102,8 @@ class SchemeMargins(TypedDict):
     disk_of_efforts: float
     """Radius of the disk in which each effort may have a factor of its own."""
     mass_centre: MassCentre
+    structured_disk: StructuredDisk | None
+    """With --structured."""
 
 
 @_TOLD
