@@ -166,21 +166,21 @@ def _start(mission: Mission, asked: Requirement, metric: Metric) -> Iterator[Che
 
 def _end(mission: Mission, asked: Requirement, metric: Metric) -> Iterator[Check]:
     """Yield whether the flight is long enough for the metric to have a value that keeps the bound."""
-    end = mission.timing.duration
+    end = min(mission.timing.duration, metric.until)
     if metric.kind in ("settling", "reaching"):
         if asked.at_most is not None:
             yield Check(
                 f"requirement.length.{asked.id}",
-                asked.at_most,
+                metric.after + asked.at_most,
                 end,
                 "s",
                 "warn",
-                "The bound lies beyond the end of the flight: what happens between the two is not seen.",
-                "Fly longer.",
-                "bound of the time, and length of the flight",
+                "The bound lies beyond the end of the flight, or of the metric's window: what is between is not seen.",
+                "Fly longer, or look longer.",
+                "bound of the time, and end of the flight or of the window",
                 strict=True,
             )
-        first = asked.at_least or 0.0
+        first = metric.after + (asked.at_least or 0.0)
     else:
         first = metric.after
     if first > 0:

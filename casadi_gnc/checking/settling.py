@@ -1,7 +1,7 @@
 """Does what a metric waits for ever come to rest, with actuators that do what they are told?
 
-A metric of the kind settling asks that a signal stays below a threshold to the end. The linear loop at the target,
-under what pushes the plant, says how far from the target the signal is held at the end of the flight.
+A metric of the kind settling whose window is open asks that a signal stays below a threshold to the end of the flight.
+The linear loop at the target, under what pushes the plant, says how far from the target the signal is held then.
 """
 
 from __future__ import annotations
@@ -13,15 +13,20 @@ import numpy as np
 from casadi_gnc.checking.linear import driven_at_the_end
 from casadi_gnc.checks import Check
 from casadi_gnc.missions.mission import Mission
-from casadi_gnc.missions.scheme import Scheme
+from casadi_gnc.missions.scheme import Metric, Scheme
 
 #: Part of the flight, at its end, that is looked at.
 _LAST = 0.1
 
 
+def settled_at_the_end(mission: Mission) -> list[Metric]:
+    """Return the metrics of the kind settling whose window is open to the end of the flight."""
+    return [one for one in mission.metrics if one.kind == "settling" and one.until >= mission.timing.duration]
+
+
 def checks(mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield, for every signal that is to settle, the largest error at the end of the flight."""
-    asked = [each for each in mission.metrics if each.kind == "settling" and each.signal in mission.target]
+    asked = [each for each in settled_at_the_end(mission) if each.signal in mission.target]
     path = driven_at_the_end(mission, scheme, _LAST) if asked else None
     if path is None or np.isnan(path).any():
         return  # no slope at the target: nothing linear can be said

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from casadi_gnc.cli import completing
 from casadi_gnc.cli.manners import print_json
+
+if TYPE_CHECKING:
+    from casadi_gnc.registry import Registry
 
 _PROBLEM = typer.Argument(
     autocompletion=completing.problems, help="A mission file: what it names of your own is listed too."
@@ -22,8 +26,10 @@ def laws(
     json: Annotated[bool, _JSON] = False,
 ) -> None:
     """List the laws: gains with symbols and units, the crafts that each fits, and why it does not fit others."""
+    from casadi_gnc.laws import REGISTRY
     from casadi_gnc.problem_files import catalogue
 
+    _refuse_name(problem, REGISTRY, "laws")
     samples = {craft.name: catalogue.sample_of(craft, problem) for craft in catalogue.crafts(problem)}
     found = [catalogue.law_data(law, samples) for law in catalogue.laws(problem)]
     found = _chosen(found, show, "law")
@@ -47,9 +53,11 @@ def crafts(
     json: Annotated[bool, _JSON] = False,
 ) -> None:
     """List the crafts: what each measures and makes, the keys of its tables, and the laws that fit it."""
+    from casadi_gnc.missions.craft import REGISTRY
     from casadi_gnc.problem_files import catalogue
     from casadi_gnc.problem_files.document import shipped
 
+    _refuse_name(problem, REGISTRY, "crafts")
     known = catalogue.laws(problem)
     found = []
     for craft in catalogue.crafts(problem):
@@ -74,6 +82,15 @@ def crafts(
             [key["table"], key["name"], "" if key["required"] else "optional", key["meaning"]] for key in craft["keys"]
         ]
         _table(["table", "key", "", "meaning"], rows)
+
+
+def _refuse_name(problem: str | None, known: Registry, command: str) -> None:
+    """Raise `RegistryError` where the name of a law or a craft stands in the place of a file."""
+    from casadi_gnc.errors import RegistryError
+
+    if problem in known.names() and not Path(str(problem)).exists():
+        told = f"{problem!r} is a {known.kind} and no problem file"
+        raise RegistryError(f"{told}; `casadi-gnc {command} --show {problem}` shows it")
 
 
 def _chosen(found: list[dict[str, Any]], name: str | None, kind: str) -> list[dict[str, Any]]:

@@ -233,6 +233,10 @@ def _print(mission: Mission, flights: list[Flight], written: list[Path], report:
             )
         for note in flight.notes:
             console.print(f"{flight.scheme}: note: {note}", highlight=False, markup=False)
+    if flights and flights[0].made["seed"] is not None:
+        console.print(
+            f"noise is drawn with the seed {flights[0].made['seed']} (noise.seed)", highlight=False, markup=False
+        )
     for where, paths in itertools.groupby(written, key=lambda path: path.parent):
         names = ", ".join(path.name for path in paths)
         console.print(f"wrote to {where}: {names}", highlight=False, markup=False)

@@ -170,11 +170,16 @@ class Craft(Part):
         return {}
 
     def flaws(self) -> Iterable[MisfitError]:
-        """Yield what keeps the craft from flying at all, with the path of the key; `check` says more of it."""
+        """Yield what keeps the craft from flying at all, with the path of the key; `check` says more of it.
+
+        Where tables have mistakes it is asked of a craft without them, and told if it can do without.
+        """
         return ()
 
     def untimely(self, timing: Timing, *, strict: bool) -> Iterable[MisfitError]:
         """Yield what does not fit the times of a flight, with the path of the key.
+
+        Where tables have mistakes it is asked of a craft whose others are right, as if there were none of those.
 
         Parameters
         ----------

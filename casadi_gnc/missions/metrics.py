@@ -3,9 +3,9 @@
 ===========  ================================================================================
 kind         value
 ===========  ================================================================================
-settling     first time after which the norm of the signal stays below `threshold` to the end,
-             [s]; none if it never does
-reaching     first time at which the norm is below `threshold`, [s]; none if it never is
+settling     time from `after` on until the norm of the signal stays below `threshold` to the end of
+             the window, [s]; none if it never does
+reaching     time from `after` on until the norm is below `threshold`, [s]; none if it never is
 peak, least  largest and smallest norm in the window
 final        norm at the last sample of the window
 mean         mean of the norm over the samples of the window
@@ -14,7 +14,7 @@ sample_sum   sum of the norm over the samples of the window, without a time step
 ===========  ================================================================================
 
 The norm is the largest magnitude ("max") or the 2-norm ("two"); the window goes from `after` to
-`until`, both included. Settling looks at the whole flight.
+`until`, both included; without them it is the whole flight.
 
 Requirements over signals are folded beside the metrics (`casadi_gnc.missions.requirements`).
 
@@ -85,10 +85,9 @@ def _column(metric: Metric) -> str:
 
 def _next(metric: Metric, signal: Any, time: Any, so_far: Any) -> Any:
     size = ca.sqrt(ca.sumsqr(signal)) if metric.norm == "two" else bounds.largest(ca.fabs(signal))
-    if metric.kind == "settling":
-        return ca.if_else(size < metric.threshold, so_far, time)
     fresh_one = so_far < 0  # NEVER: norms and times are not negative
     value = {
+        "settling": ca.if_else(size < metric.threshold, so_far, time),
         "reaching": ca.if_else(ca.logic_and(fresh_one, size < metric.threshold), time, so_far),
         "peak": bounds.maximum(size, so_far),
         "least": ca.if_else(fresh_one, size, bounds.minimum(size, so_far)),
@@ -141,35 +140,41 @@ def read_many(
     for metric in metrics:
         value = tallies[:, layout.place(_column(metric))][:, 0].copy()
         value[diverged | ~np.isfinite(value)] = math.nan
-        if metric.kind == "settling":
+        first, end, count = _window(metric, last, period)
+        if not count:
+            value[:] = math.nan
+        elif metric.kind == "settling":
             # The signal was above its threshold at `value` for the last time, or never.
-            value = np.where(value >= 0, value + period, np.where(np.isnan(value), math.nan, 0.0))
-            value[value >= last] = math.nan
+            value = np.where(value >= 0, value + period, np.where(np.isnan(value), math.nan, first))
+            value[value > end - period / 2] = math.nan
+            value -= metric.after
         else:
             value[value < 0] = math.nan
-            if metric.kind == "mean":
-                count = _samples_within(metric, last, period)
-                value = value / count if count else np.full(len(value), math.nan)
+            if metric.kind == "reaching":
+                value -= metric.after
+            elif metric.kind == "mean":
+                value /= count
         values[metric.name] = value
     return values
 
 
 def settled(time: np.ndarray, sizes: np.ndarray, threshold: float) -> float | None:
-    """Return the settling time of a recorded norm, [s], by the definition above; None if it never settles.
+    """Return the time at which a recorded norm settles, [s], by the definition above; None if it never does.
 
     Parameters
     ----------
-    time, sizes : (K,), of all samples.
+    time, sizes : (K,), of all samples of the window.
     """
     above = np.flatnonzero(~(sizes < threshold))
     first = int(above[-1]) + 1 if len(above) else 0
     return float(time[first]) if first < len(time) - 1 else None
 
 
-def _samples_within(metric: Metric, last: float, period: float) -> int:
-    """Return how many samples the window holds, by the comparisons that the fold makes."""
-    samples = round(last / period) + 1
-    return int(sum(metric.after <= k * period <= metric.until for k in range(samples)))
+def _window(metric: Metric, last: float, period: float) -> tuple[float, float, int]:
+    """Return first and last time of the samples in the window, [s], and how many; by the fold's comparisons."""
+    times = np.arange(round(last / period) + 1) * period
+    inside = times[(times >= metric.after) & (times <= metric.until)]
+    return (float(inside[0]), float(inside[-1]), len(inside)) if len(inside) else (math.nan, math.nan, 0)
 
 
 def statuses(layout: Layout, tally: np.ndarray) -> dict[StepStatus, tuple[int, float]]:

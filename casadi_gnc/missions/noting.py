@@ -29,12 +29,14 @@ def undefined(
         return (f"diverged at {raised[StepStatus.DIVERGED][1]:g} s: no metric of this flight has a value",)
     end, notes = mission.timing.duration, []
     for metric in mission.metrics:
-        if values[metric.name] is None and metric.kind == "settling":
-            notes.append(f"{metric.name}: never; at {end:g} s {metric.signal} was still above {metric.threshold:g}")
-        elif metric.after > end:
+        last = min(end, metric.until)
+        if metric.after > end:
             notes.append(f"{metric.name}: none; it looks from {metric.after:g} s on, and the flight ends at {end:g} s")
+        elif values[metric.name] is None and metric.kind == "settling":
+            notes.append(f"{metric.name}: never; at {last:g} s {metric.signal} was still above {metric.threshold:g}")
         elif values[metric.name] is None:
-            notes.append(f"{metric.name}: none; no finite sample of {metric.signal} from {metric.after:g} to {end:g} s")
+            told = f"no finite sample of {metric.signal} from {metric.after:g} to {last:g} s"
+            notes.append(f"{metric.name}: none; {told}")
     return tuple(notes)
 
 

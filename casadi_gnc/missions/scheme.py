@@ -81,7 +81,7 @@ class Metric:
     kind : what is made of the signal.
     signal : a recorded one, by name.
     threshold : below which the signal counts as settled or reached, in its unit.
-    after, until : time from which and to which samples count, [s].
+    after, until : time from which and to which samples count, [s]; times of settling and reaching count from `after`.
     unit : of the number.
     norm : of a signal of several elements: the largest magnitude, "max", or the Euclidean length, "two".
     """

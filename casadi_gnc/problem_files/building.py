@@ -21,7 +21,7 @@ from casadi_gnc.missions.paths import number_at, numbers_of
 from casadi_gnc.missions.scheme import Funnel, Metric, Scheme
 from casadi_gnc.missions.timing import Noise, Timing
 from casadi_gnc.problem_files.document import Complaints
-from casadi_gnc.problem_files.mission_tables import FunnelTable, MetricTable, NoiseTable, TimingTable
+from casadi_gnc.problem_files.mission_tables import FunnelTable, MetricTable, NoiseTable
 from casadi_gnc.tables.part import MisfitError, Part
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def mission(checked: Checked, *, strict: bool = True) -> Mission:
     complaints.settle()
     for misfit in (*parts.incredible(), *(craft.flaws() if strict else ())):
         complaints.add(misfit.path, str(misfit))
-    timing = _timing(common.timing)
+    timing = common.timing.timing()
     for misfit in craft.untimely(timing, strict=strict):
         complaints.add(misfit.path, str(misfit))
     funnels = []
@@ -139,11 +139,6 @@ def _about_parts(complaints: Complaints, schemes: list[str]) -> Iterator[None]:
         complaints.add(place, str(error))
     except GncError as error:
         complaints.add(("spacecraft", "model"), str(error))
-
-
-def _timing(given: TimingTable) -> Timing:
-    kept = round((given.record_period_s or given.sample_period_s) / given.sample_period_s)
-    return Timing(given.mode, given.sample_period_s, given.duration_s, given.plant_substeps, kept)
 
 
 def _metric(table: MetricTable) -> Metric:

@@ -18,7 +18,7 @@ from casadi_gnc.system import assets
 from casadi_gnc.system.reading import text_of
 from casadi_gnc.system.text import refused
 from casadi_gnc.tables.complaints import sentences
-from casadi_gnc.tables.part import MisfitError
+from casadi_gnc.tables.part import MisfitError, misfits_of
 from casadi_gnc.tables.wording import LONGEST, SHOWN, cut, shown
 
 Key = tuple[str | int, ...]
@@ -104,7 +104,8 @@ class Complaints:
         try:
             yield
         except MisfitError as error:
-            self.add((*key, *error.path), str(error))
+            for misfit in misfits_of(error):
+                self.add((*key, *misfit.path), str(misfit))
         except GncError as error:
             self.add(key, str(error))
 

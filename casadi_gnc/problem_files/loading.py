@@ -21,7 +21,7 @@ from casadi_gnc.missions.craft import REGISTRY as CRAFTS
 from casadi_gnc.missions.craft import Craft
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.origin import Origin
-from casadi_gnc.problem_files import building
+from casadi_gnc.problem_files import building, sound_tables
 from casadi_gnc.problem_files.boundary import about
 from casadi_gnc.problem_files.changing import changed
 from casadi_gnc.problem_files.document import Complaints, Document, read_kind
@@ -78,13 +78,13 @@ def load_document(document: Document, changes: Mapping[str, Any] | None = None, 
     """Return the mission of a document; arguments and errors as for `load`."""
     changes = changes or {}
     with guests.recorded() as files, guests.looking_in(document.folder), about(document):
-        checked = check_tables(document, changes)
+        checked = check_tables(document, changes, strict=strict)
         mission = building.mission(checked, strict=strict)
     origin = Origin(document.path.name, document.text, dict(changes), tuple(files), document.folder)
     return mission.read_from(origin)
 
 
-def check_tables(document: Document, changes: Mapping[str, Any]) -> Checked:
+def check_tables(document: Document, changes: Mapping[str, Any], *, strict: bool = True) -> Checked:
     """Return the tables of a mission file, checked; raise `ProblemError` with all that is wrong."""
     kind = craft_of(document)
     if changes:
@@ -100,6 +100,9 @@ def check_tables(document: Document, changes: Mapping[str, Any]) -> Checked:
     common = complaints.checked(MissionTables, parts)
     craft = _craft(kind, data, own, complaints)
     schemes = _schemes(kind, craft, data.get("scheme"), complaints)
+    if craft is None:
+        for misfit in sound_tables.misfits(kind, data, strict=strict):
+            complaints.add(misfit.path, str(misfit))
     complaints.settle()
     assert common is not None
     assert craft is not None

@@ -15,6 +15,7 @@ from casadi_gnc.missions.fault_handling import FaultHandling
 from casadi_gnc.missions.requirements import Requirement
 from casadi_gnc.missions.requirements.requirement import ID
 from casadi_gnc.missions.scheme import MetricKind
+from casadi_gnc.missions.timing import Timing
 from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive
 from casadi_gnc.tables.wording import shown
 
@@ -72,6 +73,11 @@ class TimingTable(Part):
             raise ValueError(f"record_period_s / sample_period_s is {kept:.6g}; expected a whole number")
         return self
 
+    def timing(self) -> Timing:
+        """Return the times of a flight."""
+        kept = round((self.record_period_s or self.sample_period_s) / self.sample_period_s)
+        return Timing(self.mode, self.sample_period_s, self.duration_s, self.plant_substeps, kept)
+
 
 class SchemeTable(Part):
     """One way to fly the mission; a craft adds how far a law may ask and how its effort is allocated."""
@@ -101,15 +107,15 @@ class MetricAsked(Part):
     norm: Literal["max", "two"] | None = Field(
         default=None, description="max: largest magnitude, two: 2-norm; two for a sample_sum, else max"
     )
-    after_s: NonNegative = Field(default=0.0, description="begin of the window; not of a settling")
-    until_s: Positive | None = Field(default=None, description="end of the window; not of a settling")
+    after_s: NonNegative = Field(
+        default=0.0, description="begin of the window; times of settling and reaching count from it"
+    )
+    until_s: Positive | None = Field(default=None, description="end of the window")
 
     @model_validator(mode="after")
     def _complete(self) -> MetricAsked:
         if (self.kind in ("settling", "reaching")) != (self.threshold is not None):
             raise ValueError("settling and reaching, and nothing else, take a threshold")
-        if self.kind == "settling" and (self.after_s or self.until_s):
-            raise ValueError("a settling looks at the whole flight and takes no after_s or until_s")
         if self.until_s is not None and self.until_s < self.after_s:
             raise ValueError(f"until_s {self.until_s:g} is before after_s {self.after_s:g}")
         return self

@@ -47,11 +47,12 @@ def lines_of(text: str) -> dict[Path, int]:
 
 
 def find(text: str, path: Path) -> int | None:
-    """Return the line of the nearest enclosing key or table that stands in the text."""
+    """Return the line of the nearest enclosing key or table that stands in the text; of several tables, the first's."""
     places = lines_of(text)
     for length in range(len(path), 0, -1):
-        if path[:length] in places:
-            return places[path[:length]]
+        for there in (path[:length], (*path[:length], 0)):
+            if there in places:
+                return places[there]
     return None
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from casadi_gnc.tables.part import MisfitError
+from casadi_gnc.tables.part import MisfitError, SeveralMisfitsError
 from casadi_gnc.tables.wording import SHOWN, cut, expected, kind_asked, length_asked, shown
 
 Path = tuple[str | int, ...]
@@ -26,7 +26,7 @@ def sentences(error: ValidationError, model: type[BaseModel], data: Any) -> list
     data : the content that was given, to tell keys of the file from alternatives that were tried.
     """
     problems: dict[Path, list[Any]] = {}
-    for problem in error.errors(include_url=False):
+    for problem in _each(error):
         path = _path(problem, data)
         context = problem.get("ctx", {}).get("error")
         if isinstance(context, MisfitError):
@@ -46,6 +46,16 @@ def sentences(error: ValidationError, model: type[BaseModel], data: Any) -> list
         for path, text in found.items()
         if not (path in missing and any(_is_meant(path, other) for other in unknown))
     ]
+
+
+def _each(error: ValidationError) -> Iterator[Any]:
+    """Return what pydantic found, of each key by itself."""
+    for problem in error.errors(include_url=False):
+        raised = problem.get("ctx", {}).get("error")
+        if isinstance(raised, SeveralMisfitsError):
+            yield from ({**problem, "ctx": {"error": misfit}} for misfit in raised.misfits)
+        else:
+            yield problem
 
 
 def _is_meant(missing: Path, given: Path) -> bool:
@@ -88,7 +98,7 @@ def _sentence(problems: list[Any], path: Path, model: type[BaseModel], data: Any
     if kind == "extra_forbidden":
         return "unknown key" + near_key(str(path[-1]), keys_at(model, problem["loc"][:-1], data))
     if kind == "missing":
-        return "is missing"
+        return "is missing" + _choices(model, path)
     if kind == "value_error":
         return str(problem.get("ctx", {}).get("error", "does not fit"))
     if kind == "union_tag_invalid":
@@ -98,7 +108,8 @@ def _sentence(problems: list[Any], path: Path, model: type[BaseModel], data: Any
         sentence = f"unknown {told['discriminator'].strip(chr(39))} {cut(repr(told['tag']), SHOWN)}"
         return sentence + (f"; did you mean {near[0]}?" if near else f"; known: {', '.join(known)}")
     if kind == "union_tag_not_found":
-        return f"lacks the key {problem['ctx']['discriminator'].strip(chr(39))}"
+        key = problem["ctx"]["discriminator"].strip("'")
+        return f"lacks the key {key}{_choices(model, (*path, key))}"
     asked = [each for each in map(kind_asked, problems) if each is not None]
     if not asked:
         return length_asked(problem) or f"is {shown(given)}, which does not fit here"
@@ -112,12 +123,28 @@ def _sentence(problems: list[Any], path: Path, model: type[BaseModel], data: Any
 
 def _may_be_left_out(model: type[BaseModel], path: Path) -> bool:
     """Return whether the value at a path is that of a key without which a file is as good."""
+    return any(type(None) in get_args(annotation) for annotation in _annotations(model, path))
+
+
+def _choices(model: type[BaseModel], path: Path) -> str:
+    """Return which words may stand at a path, as the end of a sentence; "" where it takes more than some words."""
+    words = [repr(word) for annotation in _annotations(model, path) for word in _words(annotation)]
+    return f"; write one of {', '.join(dict.fromkeys(words))}" if words else ""
+
+
+def _words(annotation: Any) -> Iterator[str]:
+    """Return the words that an annotation consists of, none where it is anything else."""
+    if get_origin(annotation) is Literal:
+        yield from (word for word in get_args(annotation) if isinstance(word, str))
+
+
+def _annotations(model: type[BaseModel], path: Path) -> list[Any]:
+    """Return what may stand at a path, of each of the models that may hold it."""
     kinds = [model]
     for part in path[:-1]:
         fields = [kind.model_fields[part] for kind in kinds if isinstance(part, str) and part in kind.model_fields]
         kinds = [found for field in fields for found in _models(field.annotation)] if fields else kinds
-    last = [kind.model_fields[path[-1]] for kind in kinds if path and path[-1] in kind.model_fields]  # type: ignore[index]
-    return any(type(None) in get_args(field.annotation) for field in last)
+    return [kind.model_fields[path[-1]].annotation for kind in kinds if path and path[-1] in kind.model_fields]  # type: ignore[index]
 
 
 def near_key(key: str, known: list[str]) -> str:

@@ -7,6 +7,7 @@ unit in the key where it helps; unknown keys, infinities, NaN and numbers as tex
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
@@ -74,6 +75,46 @@ class MisfitError(ValueError):
     def __init__(self, message: str, *path: str | int) -> None:
         self.path = path
         super().__init__(message)
+
+
+class SeveralMisfitsError(MisfitError):
+    """Say at once of several keys that they do not fit.
+
+    Parameters
+    ----------
+    misfits : two or more.
+    """
+
+    def __init__(self, misfits: Sequence[MisfitError]) -> None:
+        self.misfits = tuple(misfits)
+        super().__init__("; ".join(map(str, misfits)), *misfits[0].path)
+
+
+def all_of(*asked: Callable[[], Any]) -> None:
+    """Call each of what raises `ValueError` where something does not fit; raise all that was raised at once.
+
+    Raises
+    ------
+    ValueError
+        What one of them raises; a `SeveralMisfitsError` where there are more.
+    """
+    raised: list[ValueError] = []
+    for each in asked:
+        try:
+            each()
+        except ValueError as error:
+            raised.append(error)
+    if len(raised) == 1:
+        raise raised[0]
+    if raised:
+        raise SeveralMisfitsError([misfit for error in raised for misfit in misfits_of(error)])
+
+
+def misfits_of(error: ValueError) -> Sequence[MisfitError]:
+    """Return an error as what does not fit, of one key or of several."""
+    if isinstance(error, SeveralMisfitsError):
+        return error.misfits
+    return [error if isinstance(error, MisfitError) else MisfitError(str(error))]
 
 
 def table(default: Any = ..., note: str = "") -> Any:

@@ -230,7 +230,9 @@ def _with_last(term: Term, metric: Metric, own: tuple[Metric, ...]) -> tuple[Ter
     """Return a term with a metric of the last magnitude where its own may never come."""
     if metric.kind not in _TIMED:
         return term, own
-    last = Metric(f"{_OWN}last_{metric.signal}_{metric.norm}", "final", metric.signal, norm=metric.norm)
+    whole = not metric.after and metric.until == math.inf
+    name = f"last_{metric.signal}_{metric.norm}" if whole else f"last_of_{metric.name}"
+    last = Metric(_OWN + name, "final", metric.signal, after=metric.after, until=metric.until, norm=metric.norm)
     return replace(term, last=f"metric.{last.name}"), (*own, last)
 
 
@@ -245,20 +247,20 @@ def from_record(term: Term, time: np.ndarray, signal: np.ndarray, duration: floa
     assert metric is not None
     rows = signal.reshape(len(time), -1)
     sizes = np.linalg.norm(rows, axis=1) if metric.norm == "two" else np.abs(rows).max(axis=1)
-    if metric.kind == "settling":
-        found = metrics.settled(time, sizes, metric.threshold)
-    else:
-        inside = sizes[(time >= metric.after) & (time <= metric.until)]
-        times = time[(time >= metric.after) & (time <= metric.until)]
-        below = np.flatnonzero(inside < metric.threshold)
-        found = {
-            "reaching": lambda: float(times[below[0]]) if len(below) else None,
-            "peak": inside.max,
-            "least": inside.min,
-            "final": lambda: inside[-1],
-            "mean": inside.mean,
-            "sample_sum": inside.sum,
-        }[metric.kind]()
+    inside = sizes[(time >= metric.after) & (time <= metric.until)]
+    times = time[(time >= metric.after) & (time <= metric.until)]
+    below = np.flatnonzero(inside < metric.threshold)
+    found = {
+        "settling": lambda: metrics.settled(times, inside, metric.threshold),
+        "reaching": lambda: float(times[below[0]]) if len(below) else None,
+        "peak": inside.max,
+        "least": inside.min,
+        "final": lambda: inside[-1],
+        "mean": inside.mean,
+        "sample_sum": inside.sum,
+    }[metric.kind]()
     if found is None:
-        return duration * max(1.0, float(sizes[-1]) / metric.threshold)
+        return duration * max(1.0, float(inside[-1]) / metric.threshold)
+    if metric.kind in _TIMED:
+        found -= metric.after
     return term.factor * float(found)

@@ -114,6 +114,8 @@ def test_the_shell_is_offered_what_fits(line, offered):
         (("reproduce", "huang2021"), "'huang2020'"),
         (("crafts", "--show", "satelite"), "'satellite'"),
         (("problems", "copy", "satellites/slw", "."), "'satellites/slew'"),
+        (("laws", "mrp_feedback"), "`casadi-gnc laws --show mrp_feedback`"),
+        (("crafts", "satellite"), "`casadi-gnc crafts --show satellite`"),
     ],
 )
 def test_near_names_are_offered(words, near):

@@ -107,9 +107,7 @@ def test_robustness_counts_its_margins(formula):
 def test_metrics_count_their_samples(kind, norm):
     rng = np.random.default_rng(3)
     asked = np.exp(-np.arange(20.0) / 6)[:, None] * (1 + 0.2 * rng.random((20, 2)))
-    # Settling is asked of the whole flight.
-    window = {} if kind == "settling" else {"after": 1.0, "until": 8.0}
-    metric = Metric("m", kind, "x", threshold=0.6, norm=norm, **window)
+    metric = Metric("m", kind, "x", threshold=0.6, norm=norm, after=1.0, until=8.0)
     outcome = _OfMetric(metric, LAYOUT, 0.5)
     exact = outcome.weigh(asked, 0.0)
     for temperature in (1e-4, 0.05):

@@ -54,6 +54,7 @@ CASES = {
     "other format": (GOOD, "format = 1", "format = 2", "format is 2; this version reads format 1"),
     "negative error box": (GOOD, "centre_of_mass_error_m = [5e-3,", "centre_of_mass_error_m = [-5e-3,", r"centre_of_mass_error_m\[1\]: is -0.005, expected a number >= 0"),
     "settling without threshold": (GOOD, "threshold = 2e-3\n", "", "settling and reaching, and nothing else, take a threshold"),
+    "metric without kind": (GOOD, 'kind = "settling"\n', "", r"metric\[1\].kind: is missing; write one of 'settling', 'reaching', .*, 'sample_sum'$"),
     "name of a result file": (GOOD, 'name = "observer_pinv"', 'name = "comparison"', "cannot be named 'comparison'"),
     "inertia in other units": (GOOD, INERTIA, INERTIA.replace("0.49019", "1e200"), "no spacecraft's; look at the unit"),
     "endless": (GOOD, "duration_s = 1500.0", "duration_s = 1e308", "expected a whole number up to 1e9"),
@@ -65,7 +66,7 @@ CASES = {
     "one funnel": (SLEW, "[[funnel]]", "[funnel]", r"line LINE, funnel: there may be several funnels; write \[\[funnel\]\]"),
     "two funnels": (SLEW, "[timing]", SLEW[SLEW.index("[[funnel]]") : SLEW.index("[timing]")] + "[timing]", "'mrp' has two funnels"),
     "noise period": (GOOD, "[timing]", "[noise]\nperiod_s = 0.25\n\n[timing]", r"line 5\d, noise.period_s: period_s is 0.25, 2.5 times sample_period_s 0.1; expected a whole multiple"),
-    "window of a settling": (GOOD, "threshold = ", "after_s = 3.0\nthreshold = ", "takes no after_s or until_s"),
+    "window of a settling": (GOOD, "threshold = ", "after_s = 3.0\nuntil_s = 2.0\nthreshold = ", "before after_s 3"),
     "no funnel": (SLEW, SLEW[SLEW.index("[[funnel]]") : SLEW.index("[timing]")], "", r"scheme\[2\].law: the law 'prescribed_performance' needs a \[\[funnel\]\] on mrp, and the file has none"),
 }  # fmt: skip
 

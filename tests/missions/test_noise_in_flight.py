@@ -152,6 +152,11 @@ def test_every_kind_of_metric_is_what_numpy_makes_of_the_record():
     asked = [
         ("reach", "reaching", 0.5, 0.0, float("inf"), "two"),
         ("settle", "settling", 0.5, 0.0, float("inf"), "two"),
+        ("settle_window", "settling", 0.5, 0.95, 15.0, "two"),
+        ("settle_at_once", "settling", 0.5, 15.0, float("inf"), "two"),
+        ("settle_too_early", "settling", 0.5, 0.0, 1.0, "two"),
+        ("settle_nowhere", "settling", 0.5, 50.0, float("inf"), "two"),
+        ("reach_window", "reaching", 0.5, 0.95, 15.0, "two"),
         ("most", "peak", 0.0, 1.0, 3.0, "two"),
         ("least", "least", 0.0, 1.0, 3.0, "max"),
         ("last", "final", 0.0, 1.0, 3.05, "two"),
@@ -167,6 +172,11 @@ def test_every_kind_of_metric_is_what_numpy_makes_of_the_record():
     expected = {
         "reach": t[two < 0.5][0],
         "settle": t[two >= 0.5][-1] + 0.1,
+        "settle_window": t[(two >= 0.5) & (t <= 15.0)][-1] + 0.1 - 0.95,
+        "settle_at_once": 0.0,
+        "settle_too_early": None,
+        "settle_nowhere": None,
+        "reach_window": t[two < 0.5][0] - 0.95,
         "most": two[early].max(),
         "least": most[early].min(),
         "last": two[t <= 3.05][-1],

@@ -130,24 +130,23 @@ class _OfMetric:
 
     def _crossing(self, sizes: np.ndarray, inside: np.ndarray, temperature: float) -> tuple[float, np.ndarray]:
         """Return when the norm crosses the threshold for good, or for the first time, and its derivatives."""
-        counts, threshold, count = np.zeros(len(sizes)), self._metric.threshold, len(sizes)
+        counts, threshold = np.zeros(len(sizes)), self._metric.threshold
+        is_below = sizes[inside] < threshold
+        if not is_below.any():
+            return math.nan, counts
+        start, after = int(inside[0]), int(inside[np.argmax(is_below)])
         if self._metric.kind == "settling":
-            above = np.flatnonzero(~(sizes < threshold))
-            after = int(above[-1]) + 1 if len(above) else 0
-            if after >= count - 1:
+            above = inside[~is_below]
+            after = int(above[-1]) + 1 if len(above) else start
+            if after >= inside[-1]:
                 return math.nan, counts
-        else:
-            below = inside[sizes[inside] < threshold]
-            if not len(below):
-                return math.nan, counts
-            after = int(below[0])
-        before = after - 1
-        if not temperature > 0 or before < 0 or sizes[before] < threshold:
-            return after * self._period, counts
+        before, begin = after - 1, self._metric.after
+        if not temperature > 0 or before < start or sizes[before] < threshold:
+            return after * self._period - begin, counts
         fall = sizes[before] - sizes[after]
         share = (sizes[before] - threshold) / fall
         counts[before], counts[after] = self._period * (1 - share) / fall, self._period * share / fall
-        return (before + share) * self._period, counts
+        return (before + share) * self._period - begin, counts
 
 
 class _OfBound:

@@ -7,6 +7,7 @@ Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[f
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -37,7 +38,7 @@ from casadi_gnc.missions.timing import Timing
 from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
 from casadi_gnc.signals import Layout
 from casadi_gnc.tables import matrices
-from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, table
+from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, all_of, table
 
 from . import actuating, part_tables, unfit_times
 from .attitude_tables import InitialAttitude
@@ -107,28 +108,37 @@ class SatelliteCraft(Craft):
         if not 0 < count <= MOST_ACTUATORS:
             told = f"there are {count} wheels, thrusters and magnetorquers"
             raise ValueError(f"{told}; give 1 to {MOST_ACTUATORS} [[wheel]], [[thruster]] or [[magnetorquer]]")
+        all_of(
+            self._surrounded,
+            self._turning,
+            self._valved,
+            self.pointed,
+            self._estimator,
+            lambda: actuating.sharing(self),
+        )
+        return self
+
+    def _surrounded(self) -> None:
+        """Raise `ValueError` where something outside has nothing to act on, or does not know where and when."""
         if self.magnetorquer and self.field is None:
             raise ValueError('magnetorquers push against a magnetic field; give [field], e.g. model = "igrf"')
         if self.field is not None:
-            self._field()
-        self._turning()
-        if self.valves is not None:
-            self.valves.check(self.thruster)
+            self.magnetic_field()
         if (self.plate or self.air is not None) and self.orbit is None:
             raise MisfitError("air and sunlight need to know where the satellite is; give [orbit]", "plate")
         if self.air is not None and not self.plate:
             raise MisfitError("there is no [[plate]] for the air to push; give one for each side", "air")
-        self.pointed()
-        self._estimator()
-        actuating.sharing(self)
+
+    def _valved(self) -> None:
+        """Raise `ValueError` where valves do not fit the thrusters."""
         if self.valves is not None:
+            self.valves.check(self.thruster)
             self.actuators()
-        return self
 
     def _when(self) -> Epoch | None:
         return None if self.orbit is None else self.orbit.when()
 
-    def _field(self) -> Any:
+    def magnetic_field(self) -> Any:
         """Return the magnetic field; raise `MisfitError` where the orbit does not say where and when."""
         assert self.field is not None
         epoch = self._when()
@@ -190,7 +200,7 @@ class SatelliteCraft(Craft):
         """Return what is outside."""
         if self.orbit is None:
             return Surroundings()
-        field = None if self.field is None else self._field().at
+        field = None if self.field is None else self.magnetic_field().at
         return Surroundings(
             self.orbit.gravity(),
             self.environment.gravity_gradient,
@@ -215,7 +225,7 @@ class SatelliteCraft(Craft):
         sensors = self._sensors()
         if self.estimator is None:
             return None
-        field = None if self.field is None else self._field()
+        field = None if self.field is None else self.magnetic_field()
         if field is not None and self.estimator.field_degree is not None:
             field = replace(field, degree=self.estimator.field_degree)
         try:
@@ -279,7 +289,8 @@ class SatelliteCraft(Craft):
 
     def actuators(self) -> Actuators:
         """Return wheels, thrusters and coils as known."""
-        return actuating.actuators(self, self._at_rest()[1])
+        # Without thrusters the centre of mass does not matter, and neither do the tables that it follows from.
+        return actuating.actuators(self, self._at_rest()[1] if self.thruster else ca.DM.zeros(3))
 
     def actuation(self, keys: Part | None = None) -> Actuation:
         """Return the actuation of a scheme; [momentum] takes the place of its allocation."""
@@ -327,8 +338,12 @@ class SatelliteCraft(Craft):
 
     def panels(self, mission: Mission) -> tuple[Panel, ...]:
         """Return pointing, rate, torque, and what makes it."""
+        from .pointing_checks import wanted
+
+        limit = wanted(mission)
+        level, label = (None, "") if limit is None else (math.degrees(limit), "settled below")
         shown = [
-            Panel("lines", "pointing_error_deg", "pointing error"),
+            Panel("lines", "pointing_error_deg", "pointing error", logarithmic=True, level=level, level_label=label),
             Panel("lines", "rate", "rate"),
             Panel("effort", "torque", "torque"),
         ]

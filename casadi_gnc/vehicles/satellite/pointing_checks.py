@@ -28,6 +28,7 @@ import casadi as ca
 import numpy as np
 
 from casadi_gnc.checking.linear import held, loop_at, spectral_radius
+from casadi_gnc.checking.settling import settled_at_the_end
 from casadi_gnc.checks import Check
 from casadi_gnc.mechanics import earth, quaternions
 from casadi_gnc.mechanics.orbits import Orbit
@@ -49,9 +50,9 @@ _DEGREE = 180 / math.pi
 
 
 def wanted(mission: Mission) -> float | None:
-    """Return the smallest pointing error [rad] within which a metric of the mission wants the flight to settle."""
+    """Return the smallest pointing error [rad] within which a metric of the mission wants the flight to end."""
     units = {"pointing_error": 1.0, "pointing_error_deg": 1 / _DEGREE}
-    found = [m.threshold * units[m.signal] for m in mission.metrics if m.kind == "settling" and m.signal in units]
+    found = [m.threshold * units[m.signal] for m in settled_at_the_end(mission) if m.signal in units]
     return min(found, default=None)
 
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from casadi_gnc.errors import FlightError
 from casadi_gnc.mechanics.sensor import LATEST, Sensor
 from casadi_gnc.mechanics.sensors import Gyro, Magnetometer, StarTracker, SunSensor, Tachometers
 from casadi_gnc.tables import matrices
-from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive, Vector
+from casadi_gnc.tables.part import MisfitError, Name, NonNegative, Part, Positive, Vector, all_of
 
 from .attitude_tables import DEGREE, Attitude
 
@@ -108,9 +109,13 @@ class SunSensorTable(SensorTable):
     axis: Vector = Field(default=[0.0, 0.0, 1.0], description="middle of the view, unit vector, body axes")
     view_deg: Annotated[float, Field(gt=0, le=180)] = Field(default=180.0, description="half angle; 180: all around")
 
+    @field_validator("axis")
+    @classmethod
+    def _unit(cls, axis: list[float]) -> list[float]:
+        return matrices.check_unit(axis)
+
     def sensor(self, wheels: int) -> SunSensor:
         """Return the sun sensor."""
-        matrices.check_unit(self.axis, prefix="axis: ")
         shared = self._shared()
         return SunSensor(
             self.name, deviation=self.deviation_rad, axis=tuple(self.axis), view=DEGREE * self.view_deg, **shared
@@ -145,7 +150,8 @@ AnySensor = Annotated[
 def made(tables: Sequence[Any], wheels: int, *, has_field: bool, has_sun: bool) -> tuple[Sensor, ...]:
     """Return the sensors of a satellite; raise `MisfitError` for one with nothing to look at or the name of another."""
     found: list[Sensor] = []
-    for i, told in enumerate(tables):
+
+    def add(i: int, told: Any) -> None:
         if told.kind == "magnetometer" and not has_field:
             raise MisfitError('there is no field to measure; give [field], e.g. model = "igrf"', "sensor", i, "kind")
         if told.kind == "sun_sensor" and not has_sun:
@@ -156,4 +162,6 @@ def made(tables: Sequence[Any], wheels: int, *, has_field: bool, has_sun: bool) 
             raise MisfitError(str(error), "sensor", i) from None
         if found[-1].name in [each.name for each in found[:-1]]:
             raise MisfitError(f"another sensor is named {found[-1].name} too; give it a name", "sensor", i, "name")
+
+    all_of(*(partial(add, i, told) for i, told in enumerate(tables)))
     return tuple(found)

@@ -17,6 +17,9 @@ Motors share a torque out by the pseudo-inverse, so friction alone, and what [mo
 
     J_s Om = G+ s + n,    n' = -(I - G+ G) (f(Om) + k_n (n - n_0)).
 
+A manoeuvre that asks motors for more than they have leaves further motions in n, which friction slows as well. They
+follow from the law and are not in it.
+
 Motors make up for friction, so the body feels G f(Om), and a law that knows of neither holds the attitude at the angle
 
     4 |T (d + G f(Om))|, small as it has to be.
@@ -48,6 +51,9 @@ if TYPE_CHECKING:
 _LAST = 0.1
 #: Times of the flight at which torques are taken.
 _TIMES = 1_000
+#: Wheels that cannot move against each other without turning the body.
+_AXES = 3
+_LEFT_OUT = "; without motions of the wheels against each other that a manoeuvre leaves"
 _DEGREE = 180 / math.pi
 
 
@@ -70,8 +76,19 @@ def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme, limit: float
         "fail" if sure else "warn",
         "Torque from outside and friction of the wheels hold the attitude off by more than it should settle within.",
         "Raise the gains, let an integral or an observer take the torque, unload the wheels, or ask for less.",
-        "4 |T (d + G f)|, T of the linear loop, d and f on the reference in the last tenth of the flight",
+        "4 |T (d + G f)|, T of the linear loop, d and f on the reference in the last tenth of the flight"
+        + (_LEFT_OUT if has_idle_motions(craft) else ""),
     )
+
+
+def has_idle_motions(craft: SatelliteCraft) -> bool:
+    """Return whether wheels can move in ways that turn nothing and have friction that turns the body then."""
+    return len(craft.wheel) > _AXES and has_friction(craft)
+
+
+def has_friction(craft: SatelliteCraft) -> bool:
+    """Return whether a wheel has friction."""
+    return any(each.coulomb_N_m or each.viscous_N_m_s_per_rad for each in craft.wheel)
 
 
 def attitude_per_torque(mission: Mission, scheme: Scheme) -> np.ndarray | None:
@@ -93,7 +110,7 @@ def torque_at_the_end(craft: SatelliteCraft, mission: Mission) -> np.ndarray:
     times = np.linspace(0.0, mission.timing.duration, _TIMES + 1)
     torques, attitudes, rates = on_reference(craft, times)
     friction = np.zeros(3)
-    if any(each.coulomb_N_m or each.viscous_N_m_s_per_rad for each in craft.wheel):
+    if has_friction(craft):
         friction = friction_after(craft, times, stored_along(craft, times, torques, attitudes, rates[0]))
     return torques[times >= (1 - _LAST) * times[-1]] + friction
 

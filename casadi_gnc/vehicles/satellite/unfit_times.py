@@ -1,4 +1,4 @@
-"""What of a satellite does not fit the times of a flight: sensors, what swings, tables of references."""
+"""What of a satellite does not fit the times of a flight: field, sensors, what swings, tables of references."""
 
 from __future__ import annotations
 
@@ -18,10 +18,15 @@ if TYPE_CHECKING:
 
 
 def misfits(craft: SatelliteCraft, sensors: Sequence[Sensor], timing: Timing, *, strict: bool) -> Iterator[MisfitError]:
-    """Yield sensors that do not fit the sample period, or have no samples.
+    """Yield a field at a time that it is not known for, and sensors that do not fit the sample period, or have none.
 
     If strict, also modes and liquids above the sampling frequency, and tables of a reference that end early.
     """
+    if craft.field is not None and craft.orbit is not None and craft.orbit.when() is not None:
+        try:
+            craft.magnetic_field()
+        except MisfitError as error:
+            yield error
     for i, sensor in enumerate(sensors):
         if timing.mode != "sampled":
             yield MisfitError(f"{sensor.name} is a sensor that is sampled; fly in mode sampled", "sensor", i, "kind")
