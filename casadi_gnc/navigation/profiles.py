@@ -1,4 +1,4 @@
-"""Attitudes by time alone: a slew about one axis, a table, and one reference after another.
+"""Attitudes by time alone: a slew about one axis, and a table.
 
 Source of the slew's profile: the time-optimal turn of one axis, bang, coast, bang. The table's spline is the natural
 cubic one (de Boor, A Practical Guide to Splines (1978), chapter IV), of each element of the quaternion.
@@ -20,7 +20,6 @@ from casadi_gnc.mathematics import exact
 from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.navigation._navigation import Reference, Wanted
-from casadi_gnc.signals import Layout
 from casadi_gnc.system import csv_file
 
 #: Most rows of a table: each costs time in every sample.
@@ -218,36 +217,3 @@ def _bends(times: Sequence[float], values: Sequence[float]) -> list[float]:
     for k in reversed(range(1, count - 1)):
         bends[k] = right[k] - upper[k] * bends[k + 1]
     return bends
-
-
-@dataclass(frozen=True, eq=False)
-class Timeline(Reference):
-    """Follow one reference after another, each from its own time on.
-
-    Parameters
-    ----------
-    steps : (time [s], reference), times rising; the first counts from the start of the flight.
-    """
-
-    steps: Sequence[tuple[float, Reference]]
-
-    def __post_init__(self) -> None:
-        times = [time for time, _ in self.steps]
-        if not times or any(not later > earlier for earlier, later in pairwise(times)):
-            told = ", ".join(f"{time:g}" for time in times) or "no"
-            raise LawError(f"references from {told} s on, expected one or more, with rising times")
-
-    @property
-    def reads(self) -> Layout:
-        """What any of them reads."""
-        signals = {signal.name: signal for _, one in self.steps for signal in one.reads.signals}
-        return Layout(tuple(signals.values()))
-
-    def at(self, t: Any, known: Any) -> Wanted:
-        """Return what is wanted at time t [s]."""
-        found: Any = None
-        for time, one in self.steps:
-            wanted = one.at(t, known)
-            column = ca.vertcat(*(ca.SX(each) for each in (wanted.quaternion, wanted.rate, wanted.acceleration)))
-            found = column if found is None else ca.if_else(t >= time, column, found)
-        return Wanted(found[:4], found[4:7], found[7:])

@@ -76,6 +76,16 @@ WRONG = {
         '[[reference]]\nkind = "table"\ntimes_s = [0.0, 1.0]\nquaternions_scalar_first = [[1, 0, 0, 0], [1, 0, 0, 0]]',
         "reference[1]: the table ends at 1 s and is needed until",
     ),
+    "no turn": (
+        '[[reference]]\nkind = "inertial"\nturn_s = 5.0',
+        "reference[1].turn_s: there is no reference before it",
+    ),
+    "long turn": (
+        '[[reference]]\nkind = "inertial"'
+        + "".join(f'\n[[reference]]\nkind = "inertial"\nfrom_s = {t}\nturn_s = 3.0' for t in (2.0, 4.0)),
+        "reference[2].turn_s: the turn ends at 5 s, after the next one begins, 4 s",
+    ),
+    "unnamed": ("[[sensor]]\nperiod_s = 1.0", "sensor[1]: lacks the key kind; write one of 'gyro', 'star_tracker', "),
     "heavy": (MODE.replace("[1.0, 0", "[5.0, 0"), "spacecraft: wheels and modes have more inertia about some axis"),
     "hinge": (
         PANEL.replace("[1.0, 0", "[1.0, 1"),
@@ -157,9 +167,62 @@ def test_all_that_is_wrong_is_told_at_once(tmp_path):
         assert WRONG[name][1] in str(error.value)
 
 
-@pytest.mark.parametrize("axes", [["[1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", "[0.6, 0.8, 0.0]", "[0.8, -0.6, 0.0]"]])
-def test_four_wheels_in_a_plane(axes, tmp_path):
-    path = write(tmp_path, *map(WHEEL.format, axes))
+PLANE = "".join(map(WHEEL.format, ["[1.0, 0.0, 0.0]", "[0.0, 1.0, 0.0]", "[0.6, 0.8, 0.0]", "[0.8, -0.6, 0.0]"]))
+SLOSH = """
+[[slosh]]
+mass_kg = 5.0
+position_m = [0.0, 0.0, 0.1]
+axis = [1.0, 0.0, 0.0]
+frequency_Hz = 12.0
+damping = 0.01
+"""
+GYRO = """
+[[sensor]]
+kind = "gyro"
+angle_random_walk_rad_per_sqrt_s = 1e-6
+bias_random_walk_rad_per_s_sqrt_s = 1e-9
+period_s = 0.05
+"""
+JUMP = """
+[[reference]]
+kind = "table"
+times_s = [0.0, 1.0]
+quaternions_scalar_first = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]
+"""
+SUN = """
+[[reference]]
+kind = "sun"
+axis = [0.0, 1.0, 1.0]
+"""
+
+
+@pytest.mark.parametrize("tables", ["wrong by themselves", "wrong together"])
+def test_mistakes_of_every_kind_are_told_together(tables, tmp_path):
+    """What is wrong with a table, between tables, with the flight's times and with what the parts make together."""
+    parts = [PLANE, SLOSH, GYRO, WRONG["years"][0]]
+    expected = [
+        "wheel: the wheels make no torque about",
+        "slosh[1].frequency_Hz: 12 Hz is above the sampling frequency",
+        "sensor[1].period_s: gyro: a value every 0.05 s",
+        "orbit.epoch: the field model IGRF-14 is asked for the year 2045",
+    ]
+    if tables == "wrong together":
+        parts += [WRONG["short"][0], SUN.replace("[0.0, 1.0,", "[0.0, 0.0,"), MODE.replace("[1.0, 0", "[5.0, 0")]
+        expected += ["reference[2].from_s: begins at 0 s", "spacecraft: wheels and modes have more inertia"]
+    else:
+        parts += [JUMP, SUN, WRONG["damping"][0], WRONG["twice"][0]]
+        expected += ["reference[1]: the table jumps by 180 degrees", "reference[2].axis: a direction of length 1.414"]
+        expected += [WRONG["damping"][1], WRONG["twice"][1]]
+    with pytest.raises(ProblemError) as error:
+        casadi_gnc.load(write(tmp_path, *parts))
+    told = str(error.value).splitlines()
+    assert all(sum(each in line for line in told) == 1 for each in expected)
+    assert all("mine.toml, line " in line for line in told)
+    assert len(told) == len(expected)
+
+
+def test_four_wheels_in_a_plane(tmp_path):
+    path = write(tmp_path, PLANE)
     with pytest.raises(ProblemError, match=r"wheel: the wheels make no torque about the axis \(0, 0, -?1\)"):
         casadi_gnc.load(path)
     failed = {each.name for each in casadi_gnc.check(path) if each.verdict == "fail"}
@@ -206,6 +269,9 @@ def test_the_software_believes_what_is_true():
 def test_a_slew_ends_where_it_should():
     flight = casadi_gnc.fly("satellites/slew")
     assert flight["pointing_error_deg"][0] == pytest.approx(60.0, rel=1e-6)
+    mission = casadi_gnc.load("satellites/slew")
+    shown = next(one for one in mission.craft.panels(mission) if one.signal == "pointing_error_deg")
+    assert (shown.logarithmic, shown.level) == (True, pytest.approx(0.1, rel=1e-12))
     assert flight.metrics["settling_time"] < 120
     assert flight["pointing_error_deg"][-1] < 0.01
     turned = np.array(attitude.dcm(ca.DM(flight["mrp"][500])))

@@ -30,6 +30,10 @@ KINDS = {
     "slew": SLEW,
     "table": Table(TIMES, ROWS),
     "timeline": Timeline([(0.0, Nadir()), (100.0, SLEW)]),
+    "turns": Timeline(
+        [(0.0, Nadir()), (20.0, SunPointing(EPOCH)), (110.0, GroundTarget(EPOCH, 0.85, 0.16)), (150.0, SLEW)],
+        [0.0, 60.0, 20.0, 50.0],
+    ),
 }
 
 
@@ -143,6 +147,31 @@ def test_a_timeline_changes_at_its_times():
         assert all(np.array_equal(dense(a), dense(b)) for a, b in zip(wanted(t), one(t), strict=True))
 
 
+def test_a_turn_between_attitudes_that_stay_is_about_one_axis_and_jerks_nowhere():
+    """By hand: half of the turn after half of the time, at 15/8 of the mean rate; 53/512 of it after a quarter."""
+    axis, angle = np.array([0.6, 0.0, -0.8]), 2.0
+    last = [math.cos(angle / 2), *(math.sin(angle / 2) * axis)]
+    wanted = along(Timeline([(0.0, Inertial()), (10.0, Inertial(last))], [0.0, 40.0]))
+    for t, share, speed, push in (
+        (10.0, 0.0, 0.0, 0.0),
+        (20.0, 53 / 512, 30 * 9 / 256, 60 * 3 / 32),
+        (30.0, 0.5, 15 / 8, 0.0),
+        (50.0, 1.0, 0.0, 0.0),
+    ):
+        q, rate, acceleration, *_ = (dense(each) for each in wanted(t))
+        assert np.allclose(dense(quaternions.to_rotation_vector(ca.DM(q))), share * angle * axis, atol=1e-14)
+        assert np.allclose(rate, speed * angle / 40 * axis, atol=1e-15)
+        assert np.allclose(acceleration, push * angle / 1600 * axis, atol=1e-15)
+
+
+def test_a_turn_takes_attitude_rate_and_acceleration_from_one_to_the_other():
+    before, after = Nadir(), SunPointing(EPOCH)
+    joined = along(Timeline([(0.0, before), (20.0, after)], [0.0, 60.0]))
+    for at, one in ((20.0, before), (80.0, after)):
+        for found, expected in zip(joined(at), along(one)(at), strict=True):
+            assert np.allclose(np.abs(dense(found)), np.abs(dense(expected)), rtol=1e-12, atol=1e-15)
+
+
 def test_the_euler_axis_stays():
     """Every attitude of a slew is a turn about one axis from the first."""
     wanted = along(SLEW)
@@ -161,6 +190,13 @@ def test_the_euler_axis_stays():
         (lambda: Table([0], [TURNED]), "1 times and 1 attitudes, expected as many, 2 to 200 rows"),
         (lambda: Slew(TURNED, TURNED, 0.0, 1.0), "slew's rate is 0, expected more than 0"),
         (lambda: Timeline([]), "from no s on, expected one or more"),
+        (lambda: Timeline([(0.0, Nadir())], [1.0]), "a turn of 1 s to the first reference, which has none before it"),
+        (lambda: Timeline([(0.0, Nadir())], [0.0, 1.0]), "2 turns to 1 references, expected one to each"),
+        (lambda: Timeline([(0.0, Nadir()), (1.0, Nadir())], [0.0, -1.0]), "a turn of -1 s from 1 s on, expected 0"),
+        (
+            lambda: Timeline([(0.0, Nadir()), (1.0, Nadir()), (2.0, Nadir())], [0.0, 3.0, 0.0]),
+            "a turn of 3 s from 1 s on, expected 0 or more, and an end before 2 s",
+        ),
         (lambda: Timeline([(1.0, Inertial()), (1.0, Nadir())]), "from 1, 1 s on, expected one or more, with rising"),
     ],
 )

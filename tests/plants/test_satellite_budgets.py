@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import casadi_gnc
-from casadi_gnc.vehicles.satellite import SatelliteCraft, budgets
+from casadi_gnc.vehicles.satellite import SatelliteCraft, budgets, turn_checks
 from casadi_gnc.vehicles.satellite.reference_tables import TableTable
 
 BODY = {"mass_kg": 90.0, "inertia_kg_m2": np.diag([9.0, 11.0, 7.0]).tolist()}
@@ -49,6 +49,26 @@ def test_a_constant_torque_fills_the_wheels_where_the_body_stands():
     largest = np.linalg.norm(stored, axis=1).max()
     assert largest == pytest.approx(2 * torque[0] * times[-1] / (2 * math.pi), rel=1e-3)
     assert np.linalg.norm(stored[-1]) < 1e-6 * largest
+
+
+def test_a_turn_is_weighed_and_its_jump_is_told():
+    """About z: J a and J w of the quintic by hand; a turn of which one side passes the other's opposite jumps."""
+    last = {"axis": [0.0, 0.0, 1.0], "angle_deg": 90.0}
+    references = [{"kind": "inertial"}, {"kind": "inertial", "from_s": 10.0, "turn_s": 50.0, **last}]
+    found = {each.name: each for each in turn_checks.checks(SatelliteCraft(**BODY, wheel=WHEELS, reference=references))}
+    about_z = 7.0 - 0.8 / 600.0  # without the wheel, which turns against it
+    fastest, hardest = 15 / 8 * math.pi / 2 / 50, 10 / math.sqrt(3) * math.pi / 2 / 50**2
+    assert found["authority.turn_2_momentum"].value == pytest.approx(about_z * fastest, rel=1e-6)
+    assert found["authority.turn_2_torque"].value == pytest.approx(about_z * hardest, rel=3e-3)  # points, differences
+    assert found["authority.turn_2_torque"].limit == pytest.approx(0.02)
+    assert found["geometry.turn_2_jump"].verdict == "ok"
+    passing = {"kind": "slew", "rate_limit_deg_per_s": 1.0, "acceleration_limit_deg_per_s2": 1.0}
+    passing |= {
+        "first": {"axis": [0.0, 0.0, 1.0], "angle_deg": 170.0},
+        "last": {"axis": [0, 0, 1.0], "angle_deg": 220.0},
+    }
+    jumps = SatelliteCraft(**BODY, wheel=WHEELS, reference=[references[0], {**passing, "from_s": 10.0, "turn_s": 50.0}])
+    assert {each.name: each.verdict for each in turn_checks.checks(jumps)}["geometry.turn_2_jump"] == "fail"
 
 
 def test_slews_and_coils_are_weighed():

@@ -46,15 +46,22 @@ _SEEN = 0.1
 def checks(craft: SatelliteCraft, mission: Mission) -> Iterator[Check]:
     """Yield momentum over an orbit, torque and momentum of slews, what coils reach, and whether tables last."""
     if craft.wheel:
-        axes = np.array(part_tables.directions(craft.wheel, "axis"))
-        torques = np.array([float(each.max_torque_N_m) for each in craft.wheel])
-        stored = np.array([float(each.spin_inertia) * float(each.max_speed) for each in craft.wheel])
+        axes, torques, stored = wheels_of(craft)
         if craft.orbit is not None and np.isfinite(stored).all():
             yield _momentum(craft, mission, reach(axes, stored))
         yield from _slews(craft, axes, torques, stored)
     if craft.magnetorquer:
         yield _coils(craft, mission)
     yield from _tables(craft, mission)
+
+
+def wheels_of(craft: SatelliteCraft) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return axes of the wheels, (3, N), their largest torques, (N,), [N m], and what they store, (N,), [N m s]."""
+    return (
+        np.array(part_tables.directions(craft.wheel, "axis")),
+        np.array([float(each.max_torque_N_m) for each in craft.wheel]),
+        np.array([float(each.spin_inertia) * float(each.max_speed) for each in craft.wheel]),
+    )
 
 
 def reach(axes: np.ndarray, most: np.ndarray, direction: np.ndarray | None = None) -> float:

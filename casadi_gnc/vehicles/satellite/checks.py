@@ -16,7 +16,7 @@ from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.scheme import Scheme
 
-from . import budgets, pointing_checks, standing_checks
+from . import budgets, pointing_checks, standing_checks, turn_checks
 
 if TYPE_CHECKING:
     from .craft import SatelliteCraft
@@ -30,6 +30,7 @@ _STABLE = 2.785
 def checks(craft: SatelliteCraft, mission: Mission, scheme: Scheme) -> Iterator[Check]:
     """Yield momentum, slews and coils, and whether modes and liquids are slow enough for sampling and integrator."""
     yield from budgets.checks(craft, mission)
+    yield from turn_checks.checks(craft)
     if (limit := pointing_checks.wanted(mission)) is not None:
         yield from pointing_checks.checks(craft, mission, scheme, limit)
         yield from standing_checks.checks(craft, mission, scheme, limit)

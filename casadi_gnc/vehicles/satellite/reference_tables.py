@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from casadi_gnc import guests
 from casadi_gnc.errors import GncError, LawError
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.navigation import GroundTarget, Inertial, Nadir, Reference, Slew, SunPointing, Table, Timeline
 from casadi_gnc.tables import matrices
-from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector
+from casadi_gnc.tables.part import MisfitError, NonNegative, Part, Positive, Vector, all_of
 
 from .attitude_tables import DEGREE, Attitude, Quaternion
+
+From = Annotated[float, Field(ge=0, description="time from which it counts")]
+Turn = Annotated[float, Field(ge=0, description="time that the smooth turn from the one before takes; 0: at once")]
 
 
 class InertialTable(Attitude):
     """A fixed attitude of the body from the inertial frame; none: the frame's own."""
 
     kind: Literal["inertial"]
-    from_s: NonNegative = Field(default=0.0, description="time from which it counts")
+    from_s: From = 0.0
+    turn_s: Turn = 0.0
 
     def reference(self, epoch: Epoch | None) -> Reference:
         """Return the reference."""
@@ -32,7 +37,8 @@ class NadirTable(Attitude):
     """z to the Earth's centre, y against the orbit's normal, x along the way; an attitude is taken from there."""
 
     kind: Literal["nadir"]
-    from_s: NonNegative = Field(default=0.0, description="time from which it counts")
+    from_s: From = 0.0
+    turn_s: Turn = 0.0
 
     def reference(self, epoch: Epoch | None) -> Reference:
         """Return the reference."""
@@ -43,12 +49,17 @@ class SunTable(Part):
     """An axis to the sun."""
 
     kind: Literal["sun"]
-    from_s: NonNegative = Field(default=0.0, description="time from which it counts")
+    from_s: From = 0.0
+    turn_s: Turn = 0.0
     axis: Vector = Field(default=[0.0, 0.0, 1.0], description="unit vector, body axes, that looks at the sun")
+
+    @field_validator("axis")
+    @classmethod
+    def _unit(cls, axis: list[float]) -> list[float]:
+        return matrices.check_unit(axis)
 
     def reference(self, epoch: Epoch | None) -> Reference:
         """Return the reference."""
-        matrices.check_unit(self.axis, prefix="axis: ")
         return SunPointing(_known(epoch, "sun"), self.axis)
 
 
@@ -56,7 +67,8 @@ class GroundTable(Part):
     """z to a place on the Earth."""
 
     kind: Literal["ground"]
-    from_s: NonNegative = Field(default=0.0, description="time from which it counts")
+    from_s: From = 0.0
+    turn_s: Turn = 0.0
     latitude_deg: Annotated[float, Field(ge=-90, le=90)] = Field(description="geodetic")
     longitude_deg: Annotated[float, Field(ge=-360, le=360)] = Field(description="east positive")
     height_m: float = Field(default=0.0, description="above the ellipsoid")
@@ -72,6 +84,7 @@ class SlewTable(Part):
 
     kind: Literal["slew"]
     from_s: NonNegative = Field(default=0.0, description="time from which it counts, and at which it begins")
+    turn_s: Turn = 0.0
     first: Attitude = Attitude()
     last: Attitude
     rate_limit_deg_per_s: Positive
@@ -88,7 +101,8 @@ class TableTable(Part):
     """A spline through attitudes from the inertial frame at given times, told here or in a CSV file."""
 
     kind: Literal["table"]
-    from_s: NonNegative = Field(default=0.0, description="time from which it counts")
+    from_s: From = 0.0
+    turn_s: Turn = 0.0
     file: str | None = Field(
         default=None, description="CSV with the columns t, q0, q1, q2, q3, scalar first; beside the problem file"
     )
@@ -109,6 +123,14 @@ class TableTable(Part):
         rows = [list(row) for row in read.quaternions]
         return {**told, "times_s": list(read.times), "quaternions_scalar_first": rows}
 
+    @model_validator(mode="after")
+    def _is_one(self) -> TableTable:
+        try:
+            self.reference(None)
+        except LawError as error:
+            raise ValueError(str(error)) from None
+        return self
+
     def reference(self, epoch: Epoch | None) -> Reference:
         """Return the reference."""
         return Table(self.times_s, self.quaternions_scalar_first)
@@ -128,8 +150,9 @@ def timeline(tables: Sequence[Any], epoch: Epoch | None, *, has_orbit: bool) -> 
         For a first one that counts later, times that do not rise, an orbit or an epoch that is needed and not there,
         and what a reference itself refuses.
     """
-    steps = []
-    for i, each in enumerate(tables):
+    steps: list[tuple[float, Reference]] = []
+
+    def add(i: int, each: Any) -> None:
         if i == 0 and each.from_s > 0:
             raise MisfitError(
                 "nothing is said of the time before; let the first one begin at 0", "reference", 0, "from_s"
@@ -137,15 +160,24 @@ def timeline(tables: Sequence[Any], epoch: Epoch | None, *, has_orbit: bool) -> 
         if i > 0 and not each.from_s > tables[i - 1].from_s:
             told = f"begins at {each.from_s:g} s, not after the one before, {tables[i - 1].from_s:g} s"
             raise MisfitError(told, "reference", i, "from_s")
+        if i == 0 and each.turn_s > 0:
+            raise MisfitError("there is no reference before it to turn from; leave it out", "reference", i, "turn_s")
+        if i + 1 < len(tables) and each.from_s + each.turn_s > tables[i + 1].from_s:
+            told = f"the turn ends at {each.from_s + each.turn_s:g} s, after the next one begins"
+            raise MisfitError(
+                f"{told}, {tables[i + 1].from_s:g} s; turn faster, or begin it later", "reference", i, "turn_s"
+            )
         if each.kind in ("nadir", "ground") and not has_orbit:
             raise MisfitError("needs to know where the satellite is; give [orbit]", "reference", i, "kind")
         try:
             steps.append((each.from_s, each.reference(epoch)))
         except (LawError, ValueError) as error:
             raise MisfitError(str(error), "reference", i) from None
+
+    all_of(*(partial(add, i, each) for i, each in enumerate(tables)))
     if not steps:
         return Reference()
-    return steps[0][1] if len(steps) == 1 else Timeline(steps)
+    return steps[0][1] if len(steps) == 1 else Timeline(steps, [each.turn_s for each in tables])
 
 
 def _known(epoch: Epoch | None, kind: str) -> Epoch:
