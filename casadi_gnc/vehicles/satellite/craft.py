@@ -7,7 +7,6 @@ Tables of the file: [spacecraft]; [[wheel]], [[thruster]], [[magnetorquer]], [[f
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,7 +22,6 @@ from casadi_gnc.mathematics.exact import array
 from casadi_gnc.mechanics import quaternions
 from casadi_gnc.mechanics.earth import Epoch
 from casadi_gnc.mechanics.multibody import Assembly, Component
-from casadi_gnc.mechanics.orbits import EARTH_J2, Orbit
 from casadi_gnc.mechanics.reaction_wheels import TorqueGyrostat, WheelArray
 from casadi_gnc.mechanics.rigid_body import RigidBody
 from casadi_gnc.mechanics.sensor import Sensor
@@ -32,7 +30,7 @@ from casadi_gnc.missions.craft import Craft, EffortKeys
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.panel import Panel
 from casadi_gnc.missions.parts import Parts
-from casadi_gnc.missions.scene import Arrow, Direction, Jets, Scene, Spinners, Track
+from casadi_gnc.missions.scene import Scene
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.missions.timing import Timing
 from casadi_gnc.navigation import AttitudeNavigation, Estimator, Inertial, Reference
@@ -40,7 +38,7 @@ from casadi_gnc.signals import Layout
 from casadi_gnc.tables import matrices
 from casadi_gnc.tables.part import MOST_ACTUATORS, MisfitError, Part, Positive, Vector, all_of, table
 
-from . import actuating, part_tables, unfit_times
+from . import actuating, part_tables, showing, unfit_times
 from .attitude_tables import InitialAttitude
 from .estimator_tables import AnyEstimator
 from .orbit_tables import Environment, FieldTable, OrbitTable
@@ -59,9 +57,6 @@ from .pulse_tables import ValveTable
 from .reference_tables import AnyReference, InertialTable, timeline
 from .sensor_tables import AnySensor, made
 from .surroundings import SunDirection, Surroundings
-
-#: Seconds between points of the field along the orbit, one degree of which takes 15 s; and points at most.
-_APART, _MOST_OF_TRACK = 60.0, 721
 
 
 class Truth(Part):
@@ -179,7 +174,7 @@ class SatelliteCraft(Craft):
             tuple(self.components()),
         )
 
-    def _at_rest(self) -> tuple[Any, Any]:
+    def at_rest(self) -> tuple[Any, Any]:
         """Return inertia about the centre of mass and that centre as known, all that swings at rest."""
         known = self.assembly()
         rest = SimpleNamespace(**{each.name: ca.DM.zeros(each.size) for each in known.state.signals})
@@ -271,7 +266,7 @@ class SatelliteCraft(Craft):
 
     def belief(self) -> RigidBody:
         """Return the body as known, with its wheels."""
-        inertia, _ = self._at_rest()
+        inertia, _ = self.at_rest()
         if not self.wheel:
             return RigidBody(inertia)
         wheels = part_tables.wheels(self.wheel)
@@ -290,7 +285,7 @@ class SatelliteCraft(Craft):
     def actuators(self) -> Actuators:
         """Return wheels, thrusters and coils as known."""
         # Without thrusters the centre of mass does not matter, and neither do the tables that it follows from.
-        return actuating.actuators(self, self._at_rest()[1] if self.thruster else ca.DM.zeros(3))
+        return actuating.actuators(self, self.at_rest()[1] if self.thruster else ca.DM.zeros(3))
 
     def actuation(self, keys: Part | None = None) -> Actuation:
         """Return the actuation of a scheme; [momentum] takes the place of its allocation."""
@@ -338,58 +333,11 @@ class SatelliteCraft(Craft):
 
     def panels(self, mission: Mission) -> tuple[Panel, ...]:
         """Return pointing, rate, torque, and what makes it."""
-        from .pointing_checks import wanted
-
-        limit = wanted(mission)
-        level, label = (None, "") if limit is None else (math.degrees(limit), "settled below")
-        shown = [
-            Panel("lines", "pointing_error_deg", "pointing error", logarithmic=True, level=level, level_label=label),
-            Panel("lines", "rate", "rate"),
-            Panel("effort", "torque", "torque"),
-        ]
-        names = {"wheel_torque": "wheel torque", "force": "force", "dipole": "dipole"}
-        shown += [Panel("actuators", name, text) for name, text in names.items() if name in mission.truth.inputs]
-        if self.wheel:
-            shown.append(Panel("lines", "wheel_speed", "wheel speed"))
-        return tuple(shown)
-
-    def _jets(self) -> Jets:
-        """Return the thrusters about the centre of mass at rest."""
-        centre = np.array(ca.DM(self._at_rest()[1])).ravel()
-        return Jets(
-            "force",
-            [(np.array(each.position_m) - centre).tolist() for each in self.thruster],
-            [each.direction for each in self.thruster],
-            [each.max_force_N for each in self.thruster],
-        )
-
-    def _field_track(self, duration: float) -> list[Track]:
-        """Return the way of the magnetic field along the orbit, without what disturbs it but the Earth's oblateness."""
-        field = self.surroundings().field
-        if self.orbit is None or field is None:
-            return []
-        orbit, t = Orbit(self.orbit.elements(), EARTH_J2 if self.orbit.j2 else 0.0), ca.SX.sym("t")
-        times = np.linspace(0.0, duration, min(_MOST_OF_TRACK, 2 + int(duration / _APART)))
-        seen = ca.Function("seen", [t], [field(t, orbit.at(t)[0])]).map(len(times))
-        fields = np.array(seen(times[None])).T
-        directions = fields / np.linalg.norm(fields, axis=1)[:, None]
-        return [Track("field", np.round(times, 3).tolist(), np.round(directions, 5).tolist())]
+        return showing.panels(self, mission)
 
     def scene(self, mission: Mission) -> Scene:
         """Return the body with its wheels and thrusters, the way down, to the sun and along the field."""
-        inputs, sun = mission.truth.inputs, self._sun()
-        away = np.abs([each.position_m for each in self.thruster]).max(axis=0) if self.thruster else np.full(3, 0.5)
-        down = [] if self.orbit is None else [Arrow("position", "down", "reference", reversed=True)]
-        return Scene(
-            attitude="mrp",
-            reference="inertial frame",
-            size=[float(value) for value in np.maximum(2 * away, 0.3 * away.max())],
-            jets=self._jets() if "force" in inputs else None,
-            spinners=Spinners("wheel_speed", [each.axis for each in self.wheel]) if self.wheel else None,
-            arrows=[Arrow("rate", "rate"), *down],
-            tracks=self._field_track(mission.timing.duration),
-            directions=[] if sun is None else [Direction("sun", np.array(ca.DM(sun(0.0))).ravel().tolist())],
-        )
+        return showing.scene(self, mission)
 
     def checks(self, mission: Mission, scheme: Scheme) -> Iterator[Check]:
         """Yield what can be said of a satellite before it flies."""
