@@ -75,6 +75,9 @@ def generate(
     vectors: Annotated[
         Path | None, typer.Option(help="Of a function: CSV of the inputs of the shipped steps, columns x[0], x[1], ...")
     ] = None,
+    fault_handling: Annotated[
+        Path | None, typer.Option(help="Of a function: TOML with the keys of a mission's [fault_handling].")
+    ] = None,
     force: Annotated[bool, typer.Option(help="Overwrite a package whose files were edited.")] = False,
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, nothing else.")] = False,
 ) -> None:
@@ -87,7 +90,7 @@ def generate(
     if format in (FormatChoice.fmu, FormatChoice.fmi2, FormatChoice.fmi3):
         from casadi_gnc.delivery.fmu import generate_fmu
 
-        if state or ports or rate or vectors or commands or Path(problem).suffix == generating.ENDING:
+        if state or ports or rate or vectors or commands or fault_handling or Path(problem).suffix == generating.ENDING:
             raise PackageError("a unit is made of a mission; leave out what is for others")
         fmi = 3 if format is FormatChoice.fmi3 else 2
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains, fmi=fmi)
@@ -111,6 +114,7 @@ def generate(
             state=_pairs(state) if state else None,
             ports=_ports(ports) if ports else None,
             rate=rate,
+            fault_handling=_handling(fault_handling) if fault_handling else None,
             vectors=vectors,
             commands=commands,
             frame="" if format is FormatChoice.package else format.value,
@@ -150,6 +154,14 @@ def _ports(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
         raise PackageError(f"{path} cannot be read as TOML: {error}; expected a table for each port") from None
+
+
+def _handling(path: Path) -> Any:
+    """Return what a file says of faults."""
+    from casadi_gnc.problem_files.document import read
+    from casadi_gnc.problem_files.mission_tables import FaultHandlingTable
+
+    return read(path).validated(FaultHandlingTable).handling()
 
 
 def _words(text: str) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from casadi_gnc.embedded.members import access
 from casadi_gnc.embedded.packable import PackableFunction
 from casadi_gnc.errors import PackageError, ProblemError
 from casadi_gnc.mathematics.noise import uniforms
+from casadi_gnc.missions.fault_handling import FaultHandling
 from casadi_gnc.system.csv_file import read_table
 from casadi_gnc.system.templates import template
 
@@ -41,6 +43,7 @@ def generate_function(
     state: Mapping[str, str] | None = None,
     ports: Mapping[str, Any] | None = None,
     rate: float | None = None,
+    fault_handling: FaultHandling | None = None,
     vectors: str | Path | np.ndarray | None = None,
     target: Sequence[Any] = (),
     steps: int | None = None,
@@ -58,6 +61,7 @@ def generate_function(
     state : input -> output that is its next value.
     ports : port -> table of "unit", "note", and of a state's "initial" value.
     rate : steps a second.
+    fault_handling : what the package does with faults beside telling them.
     vectors : what the shipped steps are given, (K, columns), or a CSV with columns that are called as members of the
         input, `x[0]`, matrices column by column. Without them numbers between -1 and 1, the last ones with bad numbers.
     target : targets to measure for the README.
@@ -76,6 +80,8 @@ def generate_function(
     if not isinstance(function, ca.Function):
         title, function = f"The function of {Path(function).name}", load_function(Path(function))
     own = flight_function.flight_function(function, state=state, ports=ports, rate=rate, title=title)
+    if fault_handling is not None:
+        own = replace(own, faults=fault_handling.of_function(own))
     thing, folder = PackableFunction(own), Path(out)
     options = Options(function.name().lower() if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target)

@@ -13,6 +13,7 @@ from casadi_gnc.delivery import packaging
 from casadi_gnc.delivery.allocators import generate_allocator
 from casadi_gnc.delivery.functions import generate_function
 from casadi_gnc.errors import PackageError
+from casadi_gnc.missions.fault_handling import FaultHandling
 from casadi_gnc.missions.mission import Mission
 from casadi_gnc.problem_files.document import read
 
@@ -34,6 +35,7 @@ def generate(
     state: Mapping[str, str] | None = None,
     ports: Mapping[str, Any] | None = None,
     rate: float | None = None,
+    fault_handling: FaultHandling | None = None,
     vectors: str | Path | np.ndarray | None = None,
     commands: str | Path | None = None,
     frame: str = "",
@@ -51,7 +53,8 @@ def generate(
     steps : samples that are shipped as test vectors; 1024 by default.
     force : overwrite a package that was edited.
     scheme, tunable : of a mission, as for `casadi_gnc.delivery.packaging.generate`.
-    state, ports, rate, vectors : of a function, as for `casadi_gnc.delivery.functions.generate_function`.
+    state, ports, rate, fault_handling, vectors : of a function, as for
+        `casadi_gnc.delivery.functions.generate_function`.
     frame : "basilisk", "ros2", "freertos", "timer", "simulink" or "xtce": files beside the package that put it there.
     commands : of an allocation file, as for `casadi_gnc.delivery.allocators.generate_allocator`.
 
@@ -63,6 +66,7 @@ def generate(
     common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force, "frame": frame}
     of_missions = {"scheme": scheme, "tunable": tunable}
     of_functions: dict[str, Any] = {"state": state, "ports": ports, "rate": rate, "vectors": vectors}
+    of_functions["fault_handling"] = fault_handling
     if isinstance(thing, ca.Function) or (not isinstance(thing, Mission) and Path(thing).suffix == ENDING):
         _refuse({**of_missions, "commands": commands}, "a function")
         return generate_function(thing, out, **common, **of_functions, steps=steps)

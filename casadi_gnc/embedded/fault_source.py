@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import groupby
 from typing import Any
 
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.dictionary import Entry, entries
+from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.embedded.manifest import digest
 from casadi_gnc.embedded.members import access, elements
 from casadi_gnc.embedded.scalars import LARGEST_FLOAT, Real, c_constant
@@ -32,11 +33,26 @@ def state(controller: Controller) -> list[Entry]:
     return [*found, *_added(controller), *COUNTERS]
 
 
-def _added(controller: Controller) -> Iterator[Entry]:
-    """Yield what the options add to the state, by groups: the part of `place` before the dot."""
-    faults = controller.faults
-    if faults is None:
-        return
+def _added(controller: Controller) -> list[Entry]:
+    if controller.faults is None:
+        return []
+    replaced = ("replaced", "of them with a measurement that was replaced")
+    iterations, rows = controller.allocation is not None, controller.limited.size
+    return list(added(controller.faults, _counted(controller).values(), replaced, iterations=iterations, rows=rows))
+
+
+def added(
+    faults: Faults, counted: Iterable[str], lost: tuple[str, str], *, iterations: bool = False, rows: int = 0
+) -> Iterator[Entry]:
+    """Yield what the options add to the state, by groups: the part of `place` before the dot.
+
+    Parameters
+    ----------
+    counted : names of the bits whose steps in a row are counted.
+    lost : the member that counts steps with bad inputs, and what it is.
+    iterations : whether there is an allocator that counts them.
+    rows : of the effort, 0 where there is none; then a failure has no time of its own either.
+    """
 
     def number(place: str, note: str) -> Entry:
         return Entry(place.partition(".")[2], place, 1, "uint32", "", note)
@@ -44,14 +60,15 @@ def _added(controller: Controller) -> Iterator[Entry]:
     if faults.count or faults.latch:
         yield number("health.samples", "steps since the reset")
     if faults.count:
-        yield number("health.replaced", "of them with a measurement that was replaced")
-        if controller.allocation is not None:
+        yield number(f"health.{lost[0]}", lost[1])
+        if iterations:
             yield number("health.worst_iterations", "most iterations of the allocator in a step")
-        for name in _counted(controller).values():
+        for name in counted:
             yield number(f"in_a_row.{name.lower()}", f"steps in a row with {name}")
     if faults.latch:
-        yield Entry("failure_time", "failure.time", 1, "real", "s", "of the first failure")
-        yield number("failure.sample", "its step, from 1 on; 0: none")
+        if rows:
+            yield Entry("failure_time", "failure.time", 1, "real", "s", "of the first failure")
+        yield number("failure.sample", "step of the first failure, from 1 on; 0: none")
         yield number("failure.status", "its status")
     for name, most in faults.ages:
         yield number(f"held.{name}", f"steps in a row in which it was held; {most} at most are no fault")
@@ -60,7 +77,6 @@ def _added(controller: Controller) -> Iterator[Entry]:
         yield number("safe.failed", "failures in a row")
         yield number("safe.good", "steps without failure in a row")
     if faults.fade:
-        rows = controller.limited.size
         yield Entry("last", "fading.last", rows, "real", "", "limited effort of the last step")
         yield Entry("offset", "fading.offset", rows, "real", "", "its difference where the gains were changed")
         yield number("fading.left", "steps until the new gains alone count")
@@ -74,33 +90,41 @@ def _counted(controller: Controller) -> dict[int, str]:
 
 
 def header(controller: Controller) -> dict[str, Any]:
-    """Return what the header says: the groups that are added to the state, and the image."""
-    added = list(_added(controller))
-    groups = {name: list(rows) for name, rows in groupby(added, key=lambda one: one.place.partition(".")[0])}
-    return {"groups": groups}
+    """Return what the header says: the groups that are added to the state."""
+    return {"groups": groups(_added(controller))}
+
+
+def groups(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
+    """Return the members that are added to a state by the struct that they are in."""
+    return {name: list(rows) for name, rows in groupby(entries, key=lambda one: one.place.partition(".")[0])}
 
 
 def image(controller: Controller, real: Real) -> dict[str, Any] | None:
-    """Return where the numbers of a state lie in its image, None where there is none.
-
-    The identity says what numbers they are: it is that of every package with the same controller, state and type.
-    """
+    """Return where the numbers of a controller's state lie in its image, None where there is none."""
     if controller.faults is None or not controller.faults.image:
         return None
+    about = [controller.title, controller.scheme, str(controller.period), real]
+    return image_of(state(controller), about, real, is_cold=controller.allocation is not None)
+
+
+def image_of(state: list[Entry], about: list[str], real: Real, *, is_cold: bool = False) -> dict[str, Any]:
+    """Return where the numbers of a state lie in its image.
+
+    The identity says what numbers they are: it is that of every package with the same `about`, state and type.
+    """
     width, at, places = {"double": 8, "float": 4}[real], 4, []
-    for one in state(controller):
+    for one in state:
         for place in one.elements:
             places.append({"place": place, "at": at, "is_real": one.type == "real"})
             at += width if one.type == "real" else 4
-    about = [controller.title, controller.scheme, str(controller.period), real]
-    about += [f"{one.place} {one.size} {one.type} {one.unit}" for one in state(controller)]
+    told = [*about, *(f"{one.place} {one.size} {one.type} {one.unit}" for one in state)]
     return {
         "places": places,
         "octets": at + 4,
         "width": width,
-        "identity": int(digest("\n".join(about))[:8], 16),
+        "identity": int(digest("\n".join(told))[:8], 16),
         "largest": c_constant(LARGEST_FLOAT if real == "float" else LARGEST_DOUBLE, real),
-        "is_cold": controller.allocation is not None,
+        "is_cold": is_cold,
     }
 
 
@@ -115,14 +139,19 @@ def source(controller: Controller, options: Options) -> dict[str, Any] | None:
         {"name": name, "most": most, "same": [f"({given} == {place[given]})" for given in _of(y, name)]}
         for name, most in faults.ages
     ]
-    counted = [{"bit": name, "member": name.lower()} for name in _counted(controller).values()]
+    name, count = options.name, controller.actuators.size
+    safe = [options.constant(value) for value in faults.safe or ()] or elements("now->previous", count)
     return {
         "own": faults,
         "held": held,
-        "counted": counted,
+        "looked_at": f"const {name}_input *input, const sample *now",
+        "counted": list(_counted(controller).values()),
+        "lost": {"member": "replaced", "bits": f"(uint32_t){name.upper()}_MEASUREMENT_REPLACED"},
+        "told": "sample *now",
+        "lines": [f"now->actuators[{i}] = inside({safe[i]}, now->lower[{i}], now->upper[{i}]);" for i in range(count)],
+        "timed": True,
         "iterations": faults.count and controller.allocation is not None,
-        "safe": [options.constant(value) for value in faults.safe or ()],
-        "actuators": controller.actuators.size,
+        "actuators": count,
         "efforts": controller.limited.size,
         "steps": options.constant(float(faults.fade)),
         "image": image(controller, options.real),

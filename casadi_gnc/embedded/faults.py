@@ -15,6 +15,7 @@ A failure is a step whose status has one of the bits `failures`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 STALE, SAFE_MODE, LATCHED, FADING = 1 << 20, 1 << 21, 1 << 22, 1 << 23
 _BITS = {
@@ -50,6 +51,13 @@ class Faults:
     release_after: int = 0
     fade: int = 0
     image: bool = False
+
+    @classmethod
+    def from_data(cls, data: dict[str, Any]) -> Faults:
+        """Return the options of plain data, as `dataclasses.asdict` gives them and JSON keeps them."""
+        ages = tuple((str(name), int(most)) for name, most in data["ages"])
+        safe = None if data["safe"] is None else tuple(float(value) for value in data["safe"])
+        return cls(**{**data, "ages": ages, "safe": safe})
 
     @property
     def statuses(self) -> dict[int, tuple[str, str]]:

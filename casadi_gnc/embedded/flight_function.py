@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from importlib import metadata
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from casadi_gnc.embedded.faults import Faults
 from casadi_gnc.embedded.names import check_name
 from casadi_gnc.errors import PackageError
 from casadi_gnc.signals import Layout, Signal
@@ -31,6 +32,13 @@ STATUSES = {
 }
 #: The bit beside them of functions with a period and a time.
 _TIME_SHIFTED = ("TIME_SHIFTED", "the time did not advance by the period; the step was taken all the same")
+#: Bits of refused steps, which hold outputs and state; bits of steps of an initialised state.
+HELD, TAKEN = 1 | 2 | 4 | 64, 1 | 2 | 4 | 32 | 64
+#: What the bits of fault handling mean here.
+_HANDLED = {
+    "MEASUREMENT_STALE": "the outputs were held for longer than their age limit",
+    "SAFE_MODE": "the outputs are the safe ones",
+}
 #: What may be said of a port.
 _SAID = ("unit", "note", "initial")
 
@@ -47,6 +55,7 @@ class FlightFunction:
     initial : first value of what is remembered, element by element.
     period : seconds between two steps, or 0 where nobody said.
     units, notes : port -> its unit, what it is.
+    faults : what is done with faults beside telling them.
 
     Raises
     ------
@@ -61,6 +70,7 @@ class FlightFunction:
     period: float
     units: dict[str, str]
     notes: dict[str, str]
+    faults: Faults | None = None
 
     def __post_init__(self) -> None:
         for name in (*self.inputs.names, *self.state.names, *self.outputs.names):
@@ -98,7 +108,10 @@ class FlightFunction:
     @property
     def statuses(self) -> dict[int, tuple[str, str]]:
         """What the status of a step can say, by bit."""
-        return dict(sorted({**STATUSES, 32: _TIME_SHIFTED}.items())) if self.is_clocked else STATUSES
+        found = {**STATUSES, 32: _TIME_SHIFTED} if self.is_clocked else dict(STATUSES)
+        for bit, (name, sentence) in (self.faults.statuses if self.faults is not None else {}).items():
+            found[bit] = name, _HANDLED.get(name, sentence)
+        return dict(sorted(found.items()))
 
     @property
     def replayed(self) -> Layout:
@@ -229,6 +242,8 @@ def _dense(function: ca.Function) -> ca.Function:
 def to_text(own: FlightFunction) -> str:
     """Return a function with what was said of it as JSON; the function is CasADi's own serialisation."""
     content = {name: getattr(own, name) for name in ("title", "pairs", "initial", "period", "units", "notes")}
+    if own.faults is not None:
+        content["faults"] = asdict(own.faults)
     about = {"format": _FORMAT, "casadi": metadata.version("casadi")}
     return json.dumps({**about, **content, "function": own.function.serialize()}, indent=1) + "\n"
 
@@ -242,6 +257,7 @@ def from_text(text: str) -> FlightFunction:
         content.pop("casadi")
         initial = tuple(float(value) for value in content.pop("initial"))
         function = ca.Function.deserialize(content.pop("function"))
-        return FlightFunction(**content, initial=initial, function=function)
+        faults = Faults.from_data(content.pop("faults")) if "faults" in content else None
+        return FlightFunction(**content, initial=initial, function=function, faults=faults)
     except (ValueError, KeyError, TypeError, RuntimeError, AttributeError, MemoryError) as error:
         raise PackageError(f"the function cannot be read: {type(error).__name__}: {str(error)[:200]}") from error

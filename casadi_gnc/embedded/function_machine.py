@@ -5,7 +5,9 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from casadi_gnc.embedded.flight_function import STATUSES, FlightFunction
+from casadi_gnc.embedded.fault_machine import HandledFaults
+from casadi_gnc.embedded.faults import SAFE_MODE
+from casadi_gnc.embedded.flight_function import HELD, STATUSES, FlightFunction
 from casadi_gnc.embedded.parts import Parts
 from casadi_gnc.embedded.programs import expanded
 from casadi_gnc.embedded.programs import is_plain as is_plain_function
@@ -25,6 +27,7 @@ class FunctionMachine:
         self._function = expanded(own.function, own.function.name()) if is_plain else own.function
         self._memory = np.array(own.initial)
         self._last = np.zeros(own.outputs.size)
+        self._handled = HandledFaults(own.faults, own.outputs)
 
     @property
     def is_exact(self) -> bool:
@@ -36,7 +39,14 @@ class FunctionMachine:
         status = 0 if np.isfinite(row).all() else _BITS["INPUT_REFUSED"]
         if not status:
             status = self._advance(row)
-        return np.concatenate([self._last, self._memory, [status]])
+        faults = self._own.faults
+        if faults is None:
+            return np.concatenate([self._last, self._memory, [status]])
+        status |= self._handled.held({name: bool(status & HELD) for name, _ in faults.ages})
+        is_safe = self._handled.is_safe(status)
+        status |= SAFE_MODE if is_safe else 0
+        status |= self._handled.noted(status)
+        return np.concatenate([faults.safe if is_safe else self._last, self._memory, [status]])  # type: ignore[list-item]
 
     def _advance(self, row: np.ndarray) -> int:
         own, function = self._own, self._function

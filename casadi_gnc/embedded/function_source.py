@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+from casadi_gnc.embedded import function_faults
 from casadi_gnc.embedded.controller import Options
 from casadi_gnc.embedded.flight_function import FlightFunction, to_text
 from casadi_gnc.embedded.manifest import digest
@@ -88,6 +89,7 @@ def common(own: FlightFunction, options: Options) -> dict[str, Any]:
         "outputs": _members(own, own.outputs),
         "clocked": own.is_clocked,
         "numbers": numbers(options, own.period),
+        **function_faults.header(own, options),
         "statuses": [{"value": b, "name": n, "sentence": s} for b, (n, s) in own.statuses.items()],
     }
 

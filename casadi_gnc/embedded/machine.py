@@ -26,7 +26,7 @@ class Machine:
         self._good = np.zeros(controller.measured.size)
         self._told = np.zeros(controller.actuators.size)
         self._started = False
-        self._handled = HandledFaults(controller)
+        self._handled = HandledFaults(controller.faults, controller.measured, controller.limited.size)
         self._watch()
 
     def _run(self, name: str, **ports: Any) -> dict[str, np.ndarray]:

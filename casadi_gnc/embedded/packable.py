@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from casadi_gnc.embedded import fault_source, function_source, package
+from casadi_gnc.embedded import fault_source, function_faults, function_source, package
 from casadi_gnc.embedded.controller import Controller, Options
 from casadi_gnc.embedded.dictionary import STATUS, Dictionary, Entry, bits, calls, entries
 from casadi_gnc.embedded.flight_function import FlightFunction
@@ -68,6 +68,10 @@ class Packable(Protocol):
     def machine(self) -> str:
         """What that machine is called."""
         ...
+
+
+#: The end of the state of a function.
+READY = Entry("ready", "ready", 1, "uint32", "", "a pattern once it is initialised")
 
 
 def _real(options: Options) -> str:
@@ -175,7 +179,7 @@ class PackableFunction:
         return Dictionary(
             name, own.title, "", _real(options), own.period, texts, ("state",),
             tuple(said(own.inputs)), (*said(own.outputs), STATUS),
-            (*said(own.state, "memory."), Entry("ready", "ready", 1, "uint32", "", "a pattern once it is initialised")),
+            (*said(own.state, "memory."), *function_faults.added(own), READY),
             (), bits(own.statuses),
         )  # fmt: skip
 

@@ -69,7 +69,7 @@ def from_text(text: str) -> Controller:
             for tape, marks in content.get("marks", {}).items()
         }
         given["monitor"] = _monitor_of(content["monitor"]) if "monitor" in content else None
-        given["faults"] = _faults_of(content["faults"]) if "faults" in content else None
+        given["faults"] = Faults.from_data(content["faults"]) if "faults" in content else None
         given["allocation"] = None if content["allocation"] is None else _problem_of(content["allocation"])
     except (ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PackageError(f"the controller cannot be read: {type(error).__name__}: {str(error)[:200]}") from error
@@ -86,12 +86,6 @@ def _monitor_of(content: dict[str, Any]) -> Monitor:
         horizon=int(content["horizon"]),
         finish=int(content["finish"]),
     )
-
-
-def _faults_of(content: dict[str, Any]) -> Faults:
-    safe = content["safe"]
-    ages = tuple((str(name), int(most)) for name, most in content["ages"])
-    return Faults(**{**content, "ages": ages, "safe": None if safe is None else tuple(float(v) for v in safe)})
 
 
 def _number(value: float) -> float | str:

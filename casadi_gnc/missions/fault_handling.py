@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from casadi_gnc.embedded.faults import STALE, Faults
+from casadi_gnc.embedded.flight_function import HELD, TAKEN, FlightFunction
 from casadi_gnc.errors import FaultHandlingError, offer
 from casadi_gnc.missions.scheme import Scheme
 from casadi_gnc.signals import Layout
@@ -100,18 +101,66 @@ class FaultHandling:
             image=self.state_image,
         )
 
+    def of_function(self, own: FlightFunction) -> Faults:
+        """Return the same for the package of a function: a failure is a refused step, and all outputs are held at once.
+
+        Raises
+        ------
+        FaultHandlingError
+            For what a function does not have, and times where it has no period or that are shorter.
+        """
+        if self.gain_change_s:
+            raise FaultHandlingError("gain_change_s", "is for gains of a mission that can change; leave it out")
+        age = self.measurement_age_s
+        if isinstance(age, Mapping):
+            raise FaultHandlingError(
+                "measurement_age_s", "names signals; a refused step holds all outputs, expected one number"
+            )
+        if age and not own.period:
+            raise FaultHandlingError("measurement_age_s", "needs the period of the function; give its rate")
+        possible = (TAKEN if own.is_clocked else HELD) | (STALE if age else 0)
+        bits = {name: bit for bit, (name, _) in own.statuses.items() if bit & TAKEN}
+        return Faults(
+            failures=self._chosen(bits | {"MEASUREMENT_STALE": STALE}, possible, possible, own.function.name()),
+            count=self.count,
+            latch=self.latch_first,
+            ages=(("outputs", _steps("measurement_age_s", age, own.period)),) if age else (),
+            safe=self._safe_outputs(own.outputs.size),
+            safe_after=self.safe_after,
+            release_after=self.release_after,
+            image=self.state_image,
+        )
+
+    def _safe_outputs(self, count: int) -> tuple[float, ...] | None:
+        if isinstance(self.safe_output, str):
+            if self.safe_output == "hold":
+                raise FaultHandlingError(
+                    "safe_output", 'is "hold", which refused steps do anyway; expected "zero" or a number an output'
+                )
+            return (0.0,) * count if self.safe_output else None
+        given = tuple(float(value) for value in self.safe_output)
+        if len(given) != count or not all(math.isfinite(value) for value in given):
+            raise FaultHandlingError(
+                "safe_output", f"has {len(given)} numbers, expected a finite one for each of {count} outputs"
+            )
+        return given
+
     def _failures(self, scheme: Scheme, raised: Sequence[StepStatus]) -> int:
         known = {str(bit.name): bit.value for bit in StepStatus} | _OF_PACKAGES
+        possible = sum(bit.value for bit in raised) | _OF_PACKAGES["TIME_SHIFTED"]
+        possible |= STALE if self.measurement_age_s else 0
+        return self._chosen(known, possible, possible & ~_NO_FAILURES.value, f"scheme {scheme.name}")
+
+    def _chosen(self, known: Mapping[str, int], possible: int, default: int, whose: str) -> int:
+        """Return the bits of failures: those asked for that are possible, `default` where none was."""
         for name in self.failures:
             if name not in known:
                 raise FaultHandlingError("failures", f"has {name!r}, which is no bit of a status; {offer(name, known)}")
         if "MEASUREMENT_STALE" in self.failures and not self.measurement_age_s:
             raise FaultHandlingError("failures", "has 'MEASUREMENT_STALE', which needs measurement_age_s")
-        possible = sum(bit.value for bit in raised) | _OF_PACKAGES["TIME_SHIFTED"]
-        possible |= STALE if self.measurement_age_s else 0
-        asked = sum(known[name] for name in set(self.failures)) if self.failures else possible & ~_NO_FAILURES.value
+        asked = sum(known[name] for name in set(self.failures)) if self.failures else default
         if not possible & asked:
-            raise FaultHandlingError("failures", f"has no bit that scheme {scheme.name} raises")
+            raise FaultHandlingError("failures", f"has no bit that {whose} raises")
         return possible & asked
 
     def _ages(self, measured: Layout, period: float) -> tuple[tuple[str, int], ...]:
