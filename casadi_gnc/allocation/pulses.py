@@ -5,7 +5,7 @@ symbol      meaning
 ==========  ====================================================================================
 F           what is asked of an actuator for a sample, 0 to F_max, [N]
 h           sample period, [s]
-q, d        least difference of two widths, and least width that is not zero, [s]
+q, d        least difference of two widths, and least width that is not zero, a whole number of q, [s]
 c           what was asked and not delivered before, [N s]
 t           width of the pulse, [s]
 ==========  ====================================================================================
@@ -25,6 +25,7 @@ what is asked beyond that is lost.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,6 +37,9 @@ from casadi_gnc.mathematics import bounds
 from casadi_gnc.mathematics.exact import is_number, is_zero
 from casadi_gnc.signals import Layout, Signal
 
+#: How far from a whole number of quanta a least width may be, in quanta: rounding of a decimal text.
+_WHOLE = 1e-4
+
 
 @dataclass(frozen=True)
 class Pulse:
@@ -43,8 +47,8 @@ class Pulse:
 
     Parameters
     ----------
-    least_on : d, [s]; 0 for none.
-    quantum : q, [s]; 0 for any width.
+    least_on : d, [s], a whole number of quanta; 0 for none.
+    quantum : q, [s], as a timer ticks; 0 for any width.
     carries : whether what a pulse lacks is carried over.
     """
 
@@ -53,11 +57,22 @@ class Pulse:
     carries: bool = True
 
     def check(self, number: int, period: float) -> None:
-        """Raise `AllocationError` where an actuator, counted from 1, makes no such pulse in a period [s]."""
+        """Raise `AllocationError` where an actuator, counted from 1, makes no such pulse in a period [s].
+
+        A least width that is no whole number of quanta is one that its timer cannot make.
+        """
         for what, value in (("least width", self.least_on), ("quantum", self.quantum)):
             if is_number(value) and not 0 <= value <= period:
                 told = f"the {what} is {value:g} s"
                 raise AllocationError(f"thruster {number}: {told}, expected 0 to the period, {period:g} s")
+        if is_number(self.least_on) and is_number(self.quantum) and self.quantum:
+            count = self.least_on / self.quantum
+            if abs(count - round(count)) > _WHOLE:
+                near = [f"{k * self.quantum:.9g}" for k in (math.floor(count), math.ceil(count)) if k]
+                raise AllocationError(
+                    f"thruster {number}: no whole number of quanta of {self.quantum:g} s makes the least width, "
+                    f"{self.least_on:g} s; give {' or '.join(near)} s"
+                )
 
     def width(self, wanted: Any, period: float) -> Any:
         """Return t for a wanted width, both [s]."""

@@ -56,6 +56,9 @@ def generate(
     target: Annotated[
         str, typer.Option(autocompletion=completing.targets, help="Targets to measure for the README, apart by commas.")
     ] = "",
+    at_most_instructions: Annotated[
+        int | None, typer.Option(help="Refuse where a step's proved bound on a target is above this.")
+    ] = None,
     format: Annotated[
         FormatChoice, typer.Option(help="C package, alone or with a frame for it; an FMI unit (fmu is fmi2).")
     ] = FormatChoice.package,
@@ -90,7 +93,8 @@ def generate(
     if format in (FormatChoice.fmu, FormatChoice.fmi2, FormatChoice.fmi3):
         from casadi_gnc.delivery.fmu import generate_fmu
 
-        if state or ports or rate or vectors or commands or fault_handling or Path(problem).suffix == generating.ENDING:
+        of_others = (state, ports, rate, vectors, commands, fault_handling, at_most_instructions is not None)
+        if any(of_others) or Path(problem).suffix == generating.ENDING:
             raise PackageError("a unit is made of a mission; leave out what is for others")
         fmi = 3 if format is FormatChoice.fmi3 else 2
         written = generate_fmu(problem, out, scheme=scheme, name=name, real=real.value, tunable=gains, fmi=fmi)
@@ -109,6 +113,7 @@ def generate(
             real=real.value,
             tunable=gains,
             target=boards,
+            at_most_instructions=at_most_instructions,
             steps=steps,
             force=force,
             state=_pairs(state) if state else None,

@@ -37,6 +37,7 @@ def generate_allocator(
     real: str = "float64",
     commands: str | Path | None = None,
     target: Sequence[Any] = (),
+    at_most_instructions: int | None = None,
     force: bool = False,
     frame: str = "",
 ) -> dict[str, Any]:
@@ -51,6 +52,7 @@ def generate_allocator(
     commands : CSV of the shipped commands, columns u1, u2, ...; by default efforts of forces inside the bounds. Some
         are shipped again, each with an actuator dead or stuck, and a few bad ones at the end.
     target : targets to measure for the README.
+    at_most_instructions : as for `casadi_gnc.delivery.generating.generate`.
     force : overwrite a package that was edited.
     frame : as for `casadi_gnc.delivery.packaging.generate`.
 
@@ -65,7 +67,7 @@ def generate_allocator(
     case, document = load_allocation(problem), read(problem)
     thing, folder = making.flight_allocator(case), Path(out)
     options = Options(case.name.lower() if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
-    boards = found_boards(target)
+    boards = found_boards(target, at_most_instructions)
     package.check_room(folder, force)
     rows = _samples(thing, None if commands is None else read_commands(Path(commands), len(case.row_scale)))
     about = {
@@ -90,7 +92,18 @@ def generate_allocator(
         about_all = {**thing.about(options), "version": about["made_by"]["casadi_gnc"], "steps": len(rows)}
         return template("allocator_readme.md.j2").render(**about_all, measured=measured, sizes=sizes, spoiled=SPOILED)
 
-    pack(folder, thing, options, about, flown, readme, {making.PROBLEM: document.text}, boards, force=force)
+    pack(
+        folder,
+        thing,
+        options,
+        about,
+        flown,
+        readme,
+        {making.PROBLEM: document.text},
+        boards,
+        at_most_instructions,
+        force=force,
+    )
     return {**about, "warnings": case.warnings}
 
 

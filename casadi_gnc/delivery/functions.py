@@ -46,6 +46,7 @@ def generate_function(
     fault_handling: FaultHandling | None = None,
     vectors: str | Path | np.ndarray | None = None,
     target: Sequence[Any] = (),
+    at_most_instructions: int | None = None,
     steps: int | None = None,
     force: bool = False,
     frame: str = "",
@@ -65,6 +66,7 @@ def generate_function(
     vectors : what the shipped steps are given, (K, columns), or a CSV with columns that are called as members of the
         input, `x[0]`, matrices column by column. Without them numbers between -1 and 1, the last ones with bad numbers.
     target : targets to measure for the README.
+    at_most_instructions : as for `casadi_gnc.delivery.generating.generate`.
     steps : how many, without `vectors`; 1024 by default.
     force : overwrite a package that was edited.
     frame : as for `casadi_gnc.delivery.packaging.generate`.
@@ -84,7 +86,7 @@ def generate_function(
         own = replace(own, faults=fault_handling.of_function(own))
     thing, folder = PackableFunction(own), Path(out)
     options = Options(function.name().lower() if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
-    boards = found_boards(target)
+    boards = found_boards(target, at_most_instructions)
     package.check_room(folder, force)
     rows, spoiled = _given(own, vectors, steps)
     kept = flight_function.to_text(own)
@@ -112,7 +114,9 @@ def generate_function(
     def readme(measured: list[dict[str, Any]], sizes: tuple[int, int]) -> str:
         return _readme(own, options, about, measured, sizes[0])
 
-    pack(folder, thing, options, about, flown, readme, {making.FUNCTION: kept}, boards, force=force)
+    pack(
+        folder, thing, options, about, flown, readme, {making.FUNCTION: kept}, boards, at_most_instructions, force=force
+    )
     warnings = [
         f"{count} of {len(rows) - spoiled} steps were refused: their inputs or results are not finite; give inputs "
         "that the function takes with --vectors"

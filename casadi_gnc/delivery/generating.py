@@ -28,6 +28,7 @@ def generate(
     name: str | None = None,
     real: str = "float64",
     target: Sequence[Any] = (),
+    at_most_instructions: int | None = None,
     steps: int | None = None,
     force: bool = False,
     scheme: str | None = None,
@@ -50,6 +51,7 @@ def generate(
     name : prefix of every symbol; the mission's or the function's name by default.
     real : "float64" or "float32".
     target : targets to measure for the README.
+    at_most_instructions : what a step may take on every one of these targets by its proved bound; anything if left out.
     steps : samples that are shipped as test vectors; 1024 by default.
     force : overwrite a package that was edited.
     scheme, tunable : of a mission, as for `casadi_gnc.delivery.packaging.generate`.
@@ -61,9 +63,10 @@ def generate(
     Raises
     ------
     GncError
-        Where something given is not right; the folder is left as it was.
+        Where something given is not right, or no bound of a step is so small; the folder is left as it was.
     """
     common: dict[str, Any] = {"name": name, "real": real, "target": target, "force": force, "frame": frame}
+    common["at_most_instructions"] = at_most_instructions
     of_missions = {"scheme": scheme, "tunable": tunable}
     of_functions: dict[str, Any] = {"state": state, "ports": ports, "rate": rate, "vectors": vectors}
     of_functions["fault_handling"] = fault_handling

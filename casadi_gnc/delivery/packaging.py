@@ -40,6 +40,7 @@ def generate(
     real: str = "float64",
     tunable: Sequence[str] = (),
     target: Sequence[Any] = (),
+    at_most_instructions: int | None = None,
     steps: int = STEPS,
     force: bool = False,
     frame: str = "",
@@ -55,6 +56,7 @@ def generate(
     real : "float64" or "float32".
     tunable : gains that stay variables.
     target : targets to measure for the README.
+    at_most_instructions : as for `casadi_gnc.delivery.generating.generate`.
     steps : samples of the shipped flight.
     force : overwrite a package that was edited.
     frame : of `casadi_gnc.embedded.frames.FRAMES`, what the package is put into besides.
@@ -72,7 +74,7 @@ def generate(
     if steps > MOST_STEPS:
         raise PackageError(f"steps is {steps}, expected at most {MOST_STEPS}: vectors are text in the package")
     options = Options(mission.name if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
-    boards = found_boards(target)
+    boards = found_boards(target, at_most_instructions)
     package.check_room(folder, force)
     controller = packed(mission, scheme, tunable, monitored=True)
     sources, made_of = making.kept(mission, controller, options, fresh=not isinstance(problem, Mission))
@@ -97,7 +99,18 @@ def generate(
     def readme(measured: list[dict[str, Any]], sizes: tuple[int, int]) -> str:
         return render_readme(controller, options, about, measured, sizes)
 
-    pack(folder, PackableController(controller), options, about, flown, readme, sources, boards, force=force)
+    pack(
+        folder,
+        PackableController(controller),
+        options,
+        about,
+        flown,
+        readme,
+        sources,
+        boards,
+        at_most_instructions,
+        force=force,
+    )
     return {**about, "warnings": warnings(mission, controller.scheme, real)}
 
 
@@ -115,8 +128,20 @@ def made_by() -> dict[str, str]:
     return {"casadi_gnc": metadata.version("casadi-gnc"), "casadi": metadata.version("casadi")}
 
 
-def found_boards(target: Sequence[Any]) -> list[known_boards.Target]:
-    """Return targets, each once; raise `TargetError` for unknown ones and for tools that are missing."""
+def found_boards(target: Sequence[Any], at_most: int | None) -> list[known_boards.Target]:
+    """Return targets, each once.
+
+    Raises
+    ------
+    PackageError
+        For a limit of instructions that is none, or that no target is named for.
+    TargetError
+        For unknown targets, and for tools that are missing.
+    """
+    if at_most is not None and at_most < 1:
+        raise PackageError(f"at_most_instructions is {at_most}, expected 1 or more")
+    if at_most is not None and not target:
+        raise PackageError("at_most_instructions is counted on a target; name one, as cortex-m7")
     boards = [known_boards.find(one) for one in dict.fromkeys(target)]
     for board in boards:
         board.need()
@@ -132,6 +157,7 @@ def pack(
     readme: Callable[[list[dict[str, Any]], tuple[int, int]], str],
     sources: dict[str, str],
     boards: Sequence[known_boards.Target],
+    at_most: int | None,
     *,
     force: bool,
 ) -> None:
@@ -145,7 +171,13 @@ def pack(
     readme : its text, from the rows of the targets and the bytes of state and parameters.
     sources : files of what it was made of.
     boards : targets to measure.
+    at_most : instructions that a step may take there by its bound.
     force : overwrite files that were edited.
+
+    Raises
+    ------
+    PackageError
+        Where a step may take more instructions than `at_most` by its bound, or has none. Nothing is written.
     """
 
     def files_of(workshop: Path) -> dict[str, str]:
@@ -166,12 +198,29 @@ def pack(
             }
             for board in boards
         ]
+        if at_most is not None:
+            _hold(measured, at_most)
         files["README.md"] = readme(measured, (host.state_size, host.params_size)) + frames.note(options)
         files |= sources
         files[package.MANIFEST] = package.manifest(files, {**about, "coverage": taken.summary})
         return files
 
     package.write(folder, files_of, force=force)
+
+
+def _hold(measured: Sequence[dict[str, Any]], at_most: int) -> None:
+    """Raise `PackageError` where a step may take more instructions than a limit, by its bound, or has no bound."""
+    above = {row["target"]: row["instructions_bound"] for row in measured if (row["instructions_bound"] or 0) > at_most}
+    if above:
+        needed = ", ".join(f"{bound} on {target}" for target, bound in above.items())
+        raise PackageError(f"a step may take {needed}, at_most_instructions is {at_most}; allow {max(above.values())}")
+    for row in measured:
+        if row["instructions_bound"] is None:
+            why = row["instructions_bound_missing"]
+            raise PackageError(
+                f"at_most_instructions is {at_most}, but a step has no proved bound on {row['target']}: {why}; "
+                "leave at_most_instructions or the target out"
+            )
 
 
 def warnings(mission: Mission | None, scheme: str, real: str) -> list[str]:

@@ -68,6 +68,9 @@ class Memory:
         memory = {}
         for at, known in a.memory.items():
             other = b.memory.get(at)
+            if other is known:  # most are: a copy has the same pairs
+                memory[at] = known
+                continue
             if other is None or other[0] != known[0]:
                 continue
             same = known[1] == other[1]

@@ -28,7 +28,7 @@ _BACK = 0x7FFF0000
 #: Work after which the search gives up, in instructions: a loop without a bound, or ways that know too much to join.
 _PATIENCE = 24_000_000
 #: Places in memory that two states know are joined at so many for the work of an instruction.
-_JOINED = 1
+_JOINED = 8
 
 
 class _Ways:

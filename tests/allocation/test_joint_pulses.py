@@ -65,7 +65,7 @@ def test_facets_bound_the_zonotope(rng):
     ("pulses", "most", "valves"),
     [
         ([Pulse(0.02, 0.005)] * 8, [1.0] * 8, VALVES),
-        ([Pulse(0.02, 0.0), Pulse(0.0, 0.03), *[Pulse(0.05, 0.04)] * 6], [1.0, 2.0, *[0.7] * 6], Valves()),
+        ([Pulse(0.02, 0.0), Pulse(0.0, 0.03), *[Pulse(0.04, 0.04)] * 6], [1.0, 2.0, *[0.7] * 6], Valves()),
     ],
     ids=["a flight's", "unlike ones"],
 )

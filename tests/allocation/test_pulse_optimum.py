@@ -23,7 +23,7 @@ def widths_of(pulse):
 @pytest.mark.parametrize(
     ("pulse", "valves"),
     [
-        (Pulse(0.05, 0.04), Valves()),  # least_on is no multiple of the quantum
+        (Pulse(0.08, 0.04), Valves()),
         (Pulse(0.0, 0.07), Valves(((0, 1),))),  # nor is the period
         (Pulse(0.04, 0.04), Valves(((0, 1), (1, 2)), 2)),
     ],
@@ -48,10 +48,10 @@ def test_no_combination_is_better(pulse, valves, rng):
 
 
 def test_broken_rules_are_told():
-    rules = PulseRules([Pulse(0.05, 0.04)] * 3, PERIOD, Valves(((0, 1),), 1))
-    assert rules.broken([0.0, 0.0, 0.08]) == rules.broken([0.05, 0.0, 0.0]) == rules.broken([PERIOD, 0.0, 0.0]) == []
-    told = rules.broken([0.04, 0.09, 0.3])
-    assert [part in " ".join(told) for part in ("0.04 s is not from", "0.09 s is no multiple", "0.3 s is not from")]
+    rules = PulseRules([Pulse(0.06, 0.03)] * 3, PERIOD, Valves(((0, 1),), 1))
+    assert rules.broken([0.0, 0.0, 0.09]) == rules.broken([0.06, 0.0, 0.0]) == rules.broken([PERIOD, 0.0, 0.0]) == []
+    told = rules.broken([0.03, 0.1, 0.3])
+    assert [part in " ".join(told) for part in ("0.03 s is not from", "0.1 s is no multiple", "0.3 s is not from")]
     assert told[-2:] == ["thrusters 1 and 2 are open together", "3 valves are open, at most 1 may"]
 
 
@@ -60,6 +60,7 @@ def test_broken_rules_are_told():
     [
         (lambda: PulseRules([Pulse(0.3)], PERIOD), "least width is 0.3 s, expected 0 to the period, 0.2 s"),
         (lambda: PulseRules([Pulse(0.0, 0.3)], PERIOD), "quantum is 0.3 s, expected 0 to the period, 0.2 s"),
+        (lambda: PulseRules([Pulse(), Pulse(0.05, 0.04)], PERIOD), "thruster 2: no whole number of quanta of 0.04 s"),
         (lambda: PulseRules([Pulse()] * 2, PERIOD, Valves(((0, 2),))), "valves 1 and 3 never together"),
         (lambda: PulseRules([Pulse()] * 2, PERIOD, Valves(((1, 1),))), "expected two different ones of 1 to 2"),
         (lambda: PulseRules([Pulse()], PERIOD, Valves((), 0)), "at most 0 valves open, expected 1 or more"),
@@ -71,7 +72,7 @@ def test_rules_that_are_none_are_refused(made, told):
 
 
 def test_an_error_that_cannot_be_kept_is_told():
-    problem, rules = AllocationProblem(np.array([[1.0]]), 0.0, 1.0), PulseRules([Pulse(0.05, 0.04)], PERIOD)
+    problem, rules = AllocationProblem(np.array([[1.0]]), 0.0, 1.0), PulseRules([Pulse(0.08, 0.04)], PERIOD)
     with pytest.raises(AllocationError, match="no pulses keep this error"):
         best_pulses(problem, [1.0], rules, error=0.1)
     with pytest.raises(AllocationError, match="impulse has shape"):

@@ -26,7 +26,7 @@ PERIOD, MOST, LEAST, QUANTUM = 0.2, 1.0, 0.02, 0.005
 
 
 @pytest.mark.parametrize(
-    ("pulse", "bit"), [(Pulse(0.03, 0.007), 0.03), (Pulse(0.0, 0.02), 0.02), (Pulse(0.014, 0.01), 0.014), (Pulse(), 0)]
+    ("pulse", "bit"), [(Pulse(0.028, 0.007), 0.028), (Pulse(0.0, 0.02), 0.02), (Pulse(0.02, 0.01), 0.02), (Pulse(), 0)]
 )
 def test_what_is_carried_over_stays_within_half_a_bit(pulse, bit):
     most, asked = 2.5, ca.SX.sym("asked", 2)
@@ -209,6 +209,23 @@ def test_pulses_longer_than_a_period_are_refused(pulse):
     modulation = PulseModulation([pulse], [1.0])
     with pytest.raises(AllocationError, match=r"thruster 1: the .* is 0.3 s, expected 0 to the period, 0.2 s"):
         modulation(ca.DM([0.5]), modulation.memory.split(ca.DM([0.0])), PERIOD)
+
+
+@pytest.mark.parametrize(
+    ("pulse", "near"),
+    [
+        (Pulse(0.03, 0.007), "0.028 or 0.035"),
+        (Pulse(0.004, 0.006), "0.006"),
+        (Pulse(0.1, 1 / 32768), "0.0999755859 or"),
+    ],
+)
+def test_a_quantum_that_cannot_make_the_least_width_is_refused(pulse, near):
+    with pytest.raises(AllocationError, match=f"no whole number of quanta of .* s makes the least width.*give {near}"):
+        PulseModulation([pulse], [1.0]).check(PERIOD)
+
+
+def test_a_least_width_of_whole_quanta_is_taken_as_it_is_written():
+    PulseModulation([Pulse(0.0999755859, 1 / 32768), Pulse(0.06, 0.02), Pulse(0.07, 0.01)], [1.0] * 3).check(PERIOD)
 
 
 def test_a_mission_of_pulses_longer_than_a_period_is_refused_and_fails_the_check(tmp_path):
