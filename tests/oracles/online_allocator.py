@@ -1,6 +1,6 @@
 """Compile and call the online allocator through ctypes; geometries, instance families, certificate.
 
-Shared by `tests/allocation/test_online_allocator.py` and `tests/bench/allocation_speed.py`. It shares no code with the
+Shared by the tests of `tests/allocation` and `tests/bench/allocation_speed.py`. It shares no code with the
 library's own binding, so that each checks the other.
 """
 
@@ -267,6 +267,7 @@ def fly(kind, samples, box=5e-3, rate=None, noise=0.0, flags=("-O2",)):
 
 # ---- random instances, and a certificate that does not use the solver ---------------------------------------------
 
+SHAPES = [(4, 3), (6, 3), (8, 3), (12, 3), (16, 6), (24, 3), (24, 6)]
 FAMILIES = (
     "zero",
     "no_uncertainty",
