@@ -88,6 +88,7 @@ def generate_function(
     options = Options(function.name().lower() if name is None else name, REALS[real], frame=frame)  # type: ignore[arg-type]
     boards = found_boards(target, at_most_instructions)
     package.check_room(folder, force)
+    thing.files(options)  # what has no C form is refused before inputs of steps are made; printed once
     rows, spoiled = _given(own, vectors, steps)
     kept = flight_function.to_text(own)
     about = {

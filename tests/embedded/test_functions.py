@@ -1,6 +1,10 @@
 """Any function as C: branches, loops, tables, splines, linear systems and long functions, against CasADi's machine."""
 
+import json
 import re
+import subprocess
+import sys
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -188,3 +192,12 @@ def test_functions_of_too_many_operations_are_refused_with_their_size(monkeypatc
         PrinterError, match=r"long has \d+ operations, expected at most 1000; write what repeats as a map"
     ):
         Parts().function(long_function(10_000))
+
+
+@pytest.mark.long  # compiles 1e5 operations three times; the script prints the times as well
+def test_a_function_of_a_hundred_thousand_operations_takes_less_than_a_gigabyte():
+    script = Path(__file__).parents[1] / "bench" / "large_function.py"
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    found = json.loads(done.stdout)
+    assert found["operations"] > 100_000
+    assert max(found["own_MB"], found["compilers_MB"]) < 1000
