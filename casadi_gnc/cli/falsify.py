@@ -109,6 +109,8 @@ def _values(told: list[str]) -> dict[str, list[Any]]:
     found: dict[str, list[Any]] = {}
     for each in told:
         key, _, values = each.partition("=")
+        if key in found:
+            raise CampaignError(f"--over names {key!r} twice; give all its values at once")
         try:
             found[key] = tomllib.loads(f"values = [{values}]")["values"] if values.strip() and key else []
         except tomllib.TOMLDecodeError:

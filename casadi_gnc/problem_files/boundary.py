@@ -42,8 +42,10 @@ def about(problem: str | Path | Document) -> Iterator[None]:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             yield
-    except ProblemError:
-        raise
+    except ProblemError as error:
+        if error.place or name in str(error):
+            raise
+        raise ProblemError(str(error), name) from None
     except GncError as error:
         if name not in str(error):
             error.args = (f"{name}: {error}",)

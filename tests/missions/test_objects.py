@@ -316,7 +316,7 @@ def test_overrides_reach_where_the_file_is_silent():
     assert pushed.truth.disturbance.constant[1] == 1e-3
     with pytest.raises(gnc.GncError, match="'noise.sed' leads nowhere: noise has no 'sed'; did you mean seed"):
         gnc.load("huang2020/slew", {"noise.sed": 3})
-    with pytest.raises(gnc.GncError, match="'noize.seed' leads nowhere: the file has no 'noize'; did you mean noise"):
+    with pytest.raises(gnc.GncError, match="slew.toml: 'noize.seed' leads nowhere: the file has no 'noize'; did you"):
         gnc.load("huang2020/slew", {"noize.seed": 3})
 
 

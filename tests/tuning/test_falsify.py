@@ -61,6 +61,9 @@ def test_values_of_over_are_those_of_a_file(tmp_path):
         done = CliRunner().invoke(app, ["falsify", str(file), "--requirement", "P", "--over", bad])
         assert isinstance(done.exception, CampaignError)
         assert "expected KEY=VALUE,VALUE,..., values as in the file" in str(done.exception)
+    twice = [word for value in ("0.1", "0.2") for word in ("--over", f"timing.sample_period_s={value}")]
+    done = CliRunner().invoke(app, ["falsify", str(file), "--requirement", "P", *twice])
+    assert "names 'timing.sample_period_s' twice" in str(done.exception)
 
 
 @pytest.mark.slow  # the searches themselves are tested on formulas
