@@ -11,6 +11,7 @@ from differences import flown, richardson
 import casadi_gnc
 from casadi_gnc.errors import FlightError
 from casadi_gnc.missions.requirements import Requirement
+from casadi_gnc.missions.sensitivities import engine as engines
 
 #: Of the other missions, which take longer to build.
 MORE = {
@@ -66,7 +67,7 @@ STEPS = {"satellites/slew_and_track": [1e-2, 3e-3]}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*FLIGHTS, *(pytest.param(one, marks=pytest.mark.long) for one in MORE | AWAY)])
-def test_tangents_and_adjoints_of_the_first_1000_samples(name):
+def test_tangents_and_adjoints_of_the_first_1000_samples(name, monkeypatch):
     """Truth: differences of the same flight in long double, extrapolated, of steps in which no decision turns."""
     scheme, keys = (FLIGHTS | MORE | AWAY)[name]
     varied, engine, p, places, record, weights = flown(name, scheme, keys, away=0.01 if name in AWAY else 0.0)
@@ -74,6 +75,12 @@ def test_tangents_and_adjoints_of_the_first_1000_samples(name):
     found = engine.values(p, seed)
     assert np.array_equal(found.asked, record)  # word for word
     back = engine.adjoint(p, seed, weights, found)
+    along = engine.along(p, seed, np.eye(len(p)))
+    assert along is not None
+    assert np.array_equal(along.asked, record)
+    np.testing.assert_allclose(along.gradient(weights), back, rtol=1e-9, atol=1e-12)
+    monkeypatch.setattr(engines, "_ROOM", 100 * along.asked.shape[1] * len(p))  # in parts of 100 samples
+    assert engine.along(p, seed, np.eye(len(p))) is None
     np.testing.assert_allclose(engine.tangents(p, seed, weights, np.eye(len(p))), back, rtol=1e-9, atol=1e-12)
     if not long_double_flight.FINER:
         pytest.skip("long double is no finer than double here")

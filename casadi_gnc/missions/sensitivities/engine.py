@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import casadi as ca
@@ -16,9 +17,11 @@ from casadi_gnc.system import assets, compilers
 
 #: Samples whose states are kept at once for the way back; a longer flight is flown once more, part by part.
 PART = 20_000
-#: Directions side by side.
+#: Directions side by side, at most: four cost what one does in a build for four, one less in a build for one.
 _LANES = 4
-_FLAGS = ("-O2", "-ftree-vectorize", "-fopenmp-simd", "-fno-math-errno", "-fno-trapping-math", f"-DLANES={_LANES}")
+_FLAGS = ("-O2", "-ftree-vectorize", "-fopenmp-simd", "-fno-math-errno", "-fno-trapping-math")
+#: Numbers that derivatives of all samples may take before they are summed up part by part.
+_ROOM = 8_000_000
 
 
 class _Case(ctypes.Structure):
@@ -36,6 +39,25 @@ class Flown:
     kept: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Along:
+    """Hold what is asked of every sample, (K, Q), the plant's state at the end, and derivatives of what is asked.
+
+    Parameters
+    ----------
+    asked : (K, Q). last : of the plant's state.
+    slopes : (K, D, Q), by direction.
+    """
+
+    asked: np.ndarray
+    last: np.ndarray
+    slopes: np.ndarray
+
+    def gradient(self, weights: np.ndarray) -> np.ndarray:
+        """Return derivatives of the sum of what is asked by weights, (K, Q) -> (D,)."""
+        return np.einsum("kq,kdq->d", weights, self.slopes)
+
+
 class DerivativeEngine:
     """Fly one point of a mission's parameters with derivatives.
 
@@ -43,6 +65,7 @@ class DerivativeEngine:
     ----------
     varied : the mission and its parameters.
     quantities : row of a record -> what is asked of every sample, (Q,).
+    lanes : directions side by side; by default as many as parameters, but 1, 2 or 4.
 
     Raises
     ------
@@ -50,15 +73,19 @@ class DerivativeEngine:
         For an allocation or a quantity without derivatives; where there is no compiler.
     """
 
-    def __init__(self, varied: Varied, quantities: ca.Function, compiler: compilers.Compiler | None = None) -> None:
+    def __init__(
+        self, varied: Varied, quantities: ca.Function, compiler: compilers.Compiler | None = None, lanes: int = 0
+    ) -> None:
+        self._lanes = lanes or min(2 ** max(varied.parameters.size - 1, 0).bit_length(), _LANES)
         tape = asked_tape(varied, quantities)
         self.source = sensitivities_source(varied, tape)
         include, allocator = assets.folder("codegen") / "runtime", varied.scheme.actuation.allocator
-        flags, units, self._data, self._workspace = _FLAGS, (), np.zeros(0), 0
+        own = (*_FLAGS, f"-DLANES={self._lanes}")
+        flags, units, self._data, self._workspace = own, (), np.zeros(0), 0
         if isinstance(allocator, OnlineInFlight):
             (flags, units), found = build_options(varied.scheme, "gnc"), allocator.solver(compiler)
             self._data, self._workspace = found.contents
-            flags = (*flags, *_FLAGS[1:])
+            flags = (*flags, *own[1:])
         self._c = compilers.load(self.source, include=include, flags=flags, units=units, compiler=compiler)
         self._c.gnc_sizes.restype = ctypes.c_long
         self._carried, self._tangent, self._adjoint, self._kept = (int(self._c.gnc_sizes(i)) for i in range(4))
@@ -93,19 +120,44 @@ class DerivativeEngine:
         weights : (K, Q).
         directions : (D, P), of the parameters.
         """
+        part = max(1, _ROOM // max(1, self._asked * len(directions)))
+        gradient = np.zeros(len(directions))
+        for first, found in self._along(p, seed, directions, part):
+            gradient += found.gradient(weights[first : first + len(found.asked)])
+        return gradient
+
+    def along(self, p: np.ndarray, seed: int, directions: np.ndarray) -> Along | None:
+        """Fly once, derivatives of all that is asked along with it; None where they would take too much memory.
+
+        Parameters
+        ----------
+        directions : (D, P), of the parameters.
+        """
+        if self._samples * self._asked * len(directions) > _ROOM:
+            return None
+        ((_, found),) = self._along(p, seed, directions, self._samples)
+        return found
+
+    def _along(self, p: np.ndarray, seed: int, directions: np.ndarray, part: int) -> Iterator[tuple[int, Along]]:
+        """Yield the first sample of each part, and what was found in it."""
         case, count = _Point(self, p, seed), len(directions)
-        blocks = -(-count // _LANES)
-        seeds = np.zeros((blocks, self._parameters, _LANES))
+        blocks = -(-count // self._lanes)
+        seeds = np.zeros((blocks, self._parameters, self._lanes))
         for i, direction in enumerate(directions):
-            seeds[i // _LANES, :, i % _LANES] = direction
-        tangents, gradient = np.zeros((blocks, self._tangent)), np.zeros((blocks, _LANES))
+            seeds[i // self._lanes, :, i % self._lanes] = direction
+        tangents = np.zeros((blocks, self._tangent))
         for block in range(blocks):
             self._c.gnc_begin_tangents(at(case.p), at(case.seeds), at(seeds[block]), at(tangents[block]))
-        self._c.gnc_tangents(
-            ctypes.byref(case.c), at(case.carried), at(tangents), ctypes.c_long(blocks), ctypes.c_long(0),
-            ctypes.c_long(self._samples), at(np.ascontiguousarray(weights)), at(gradient),
-        )  # fmt: skip
-        return gradient.ravel()[:count]
+        for first in range(0, self._samples, part):
+            samples = min(part, self._samples - first)
+            asked = np.zeros((samples, self._asked))
+            slopes = np.zeros((samples, blocks, self._asked, self._lanes))
+            self._c.gnc_tangents(
+                ctypes.byref(case.c), at(case.carried), at(tangents), ctypes.c_long(blocks), ctypes.c_long(first),
+                ctypes.c_long(samples), at(asked), at(slopes),
+            )  # fmt: skip
+            by_direction = slopes.transpose(0, 1, 3, 2).reshape(samples, blocks * self._lanes, self._asked)[:, :count]
+            yield first, Along(asked, case.carried[: self._states].copy(), by_direction)
 
     def adjoint(self, p: np.ndarray, seed: int, weights: np.ndarray, flown: Flown) -> np.ndarray:
         """Return the gradient of the weighed sum of what is asked by the parameters, (P,)."""

@@ -16,7 +16,7 @@ from casadi_gnc.missions.mission import Mission
 from casadi_gnc.missions.one_build import OneBuild
 from casadi_gnc.missions.parameters import Varied, vary
 from casadi_gnc.missions.requirements import Requirement
-from casadi_gnc.missions.sensitivities.engine import DerivativeEngine
+from casadi_gnc.missions.sensitivities.engine import Along, DerivativeEngine, Flown
 from casadi_gnc.missions.sensitivities.outcomes import Weighed, outcome_of
 
 Method = Literal["adjoint", "tangents"]
@@ -115,7 +115,8 @@ class Sensitivities:
             raise FlightError(f"method is {method!r}, expected 'adjoint' or 'tangents'")
         p = np.array(row, dtype=float)
         noise = self.varied.nominal.noise.seed if seed is None else seed
-        flown = self._engine.values(p, noise)
+        along = self._engine.along(p, noise, np.eye(len(p))) if method == "tangents" else None
+        flown = self._engine.values(p, noise) if along is None else along
         if not (np.abs(flown.last) <= CREDIBLE).all() or not np.isfinite(flown.asked).all():
             nothing = np.full(len(p), math.nan)
             return Sensitivity(self.keys, self._outcome.diverged, self._outcome.diverged, nothing, 0.0)
@@ -124,9 +125,11 @@ class Sensitivities:
         gradient = self._gradient(p, noise, weighed, flown, method)
         return Sensitivity(self.keys, weighed.value, exact.value, gradient, weighed.slack)
 
-    def _gradient(self, p: np.ndarray, seed: int, weighed: Weighed, flown: Any, method: Method) -> np.ndarray:
+    def _gradient(self, p: np.ndarray, seed: int, weighed: Weighed, flown: Flown | Along, method: Method) -> np.ndarray:
         if not weighed.weights.any():
             return np.zeros(len(p))
+        if isinstance(flown, Along):
+            return flown.gradient(weighed.weights)
         if method == "adjoint":
             return self._engine.adjoint(p, seed, weighed.weights, flown)
         return self._engine.tangents(p, seed, weighed.weights, np.eye(len(p)))
