@@ -115,6 +115,9 @@ int main(void)
     eight_input input = {{0.3, -0.2, 0.1}, {0}, {0}};
     eight_output output, other;
     int wrong = eight_step(&state, &params, &input, &output) != EIGHT_NOT_INITIALISED;
+    eight_reset(0, &params);
+    eight_reset(&state, 0);
+    if (eight_init(0) != 1 || eight_configure(0) != 1) return 94;
     wrong |= (eight_init(&params) != 0) << 1;
     wrong |= (eight_step(&state, &params, &input, &output) != EIGHT_NOT_INITIALISED) << 2;
     eight_reset(&state, &params);

@@ -124,6 +124,13 @@ int main(void)
     table.checksum = slew_checksum(&table);
     SAY("range", slew_load(&params, &table));
     SAY("same", memcmp(&damaged, &params, sizeof params));
+    slew_reset(0);
+    SAY("null_init", slew_init(0));
+    SAY("null_configure", slew_configure(0));
+    SAY("null_checksum", slew_checksum(0));
+    SAY("null_table", slew_load(&params, 0));
+    SAY("null_load", slew_load(0, &table));
+    SAY("same", memcmp(&damaged, &params, sizeof params));
     return 0;
 }
 """
@@ -157,6 +164,7 @@ def test_misuse_is_told(real, tmp_path):
         ("null_input", UNINITIALISED), ("null_output", UNINITIALISED), ("damaged", UNINITIALISED),
         ("told", UNINITIALISED), ("checksum", zlib.crc32(values)), ("load", 0), ("taken", 1),
         ("corrupted", 2), ("same", 0), ("range", 1), ("same", 0), ("range", 1), ("same", 0),
+        ("null_init", 1), ("null_configure", 1), ("null_checksum", 0), ("null_table", 2), ("null_load", 2), ("same", 0),
     ]  # fmt: skip
     assert told() == expected
     asked = [*expected[:5], ("defaults", UNCONFIGURED), ("configure", 0), *expected[5:23]]
