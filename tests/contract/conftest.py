@@ -1,4 +1,4 @@
-"""Let the contract tests share which missions they run over."""
+"""Let the contract tests share missions and back ends."""
 
 import sys
 from pathlib import Path

@@ -3,45 +3,21 @@
 Truth is the certificate, which needs no solver, and that no two back ends contradict each other's.
 """
 
-import importlib.util
-import os
-import subprocess
-import sys
-from functools import cache, partial
-from importlib import metadata
-from pathlib import Path
-from types import SimpleNamespace
+from functools import partial
 
 import numpy as np
 import pytest
+from installed_backends import CASES, NAMES, answer, is_inside, need, oracle
 
-from casadi_gnc.allocation import AllocationProblem, AllocationStatus, Allocator, Answer, backends, solve
-from casadi_gnc.allocation.backends import BackEnd, Capability, Found
-from casadi_gnc.errors import AllocationError, GncError
+from casadi_gnc.allocation import AllocationProblem, AllocationStatus, Allocator, backends, solve
+from casadi_gnc.allocation.backends import Capability
+from casadi_gnc.errors import AllocationError
 
-_spec = importlib.util.spec_from_file_location(
-    "allocation_cases", Path(__file__).parents[1] / "oracles" / "allocation_cases.py"
-)
-oracle = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(oracle)
-
-CASES = oracle.cases()
-NAMES = backends.names()
 #: Without curvature of their own (M1 = M2 = 0) the gap has a part of first order in the forces: a
 #: solver's 1e-8 of the box is 1e-8 of the full effort's cost.
 DEGENERATE_FLOOR = 1e-7
 #: Back ends that take long for each problem: a second, and hundreds of iterations in Python.
 LONG = ("sdp_scs", "eiqp")
-
-
-def need(name: str) -> str:
-    """Return the name of a back end that is installed; without it fail in CI and skip, by name, elsewhere."""
-    lacking = backends.missing(name)
-    if lacking:
-        if os.environ.get("CI") == "true":
-            pytest.fail(f"CI needs {', '.join(lacking)} for the back end {name}")
-        pytest.skip(f"{', '.join(lacking)} is not installed, for the back end {name}")
-    return name
 
 
 @pytest.fixture(params=NAMES)
@@ -68,21 +44,10 @@ def some_problem(name: str) -> AllocationProblem:
     return CASES["5 mm, random 0" if robust else "no error"].problem
 
 
-@cache
-def answer(name: str, label: str) -> Answer:
-    case = CASES[label]
-    return solve(case.problem, case.command, case.previous, backend=name)
-
-
 def scale(case) -> float:
     """Cost of the largest effort about: what rounding floors are shares of."""
     problem = case.problem
     return problem.accuracy_weight * max(problem.full_effort, float(np.linalg.norm(case.command))) ** 2
-
-
-def is_inside(case, forces) -> bool:
-    lower, upper = case.problem.box(case.previous)
-    return forces.shape == lower.shape and bool(np.all((lower <= forces) & (forces <= upper)))
 
 
 def test_all_cases_are_feasible_and_as_accurate_as_stated(name):
@@ -265,162 +230,6 @@ def test_every_solver_of_qpsolvers_can_be_named(solver):
 
 def test_solvers_under_the_gpl_are_never_chosen():
     assert not {"quadprog", "cvxopt", "kvxopt", "ecos", "qpswift"}.intersection(NAMES)
-
-
-# Back ends that lie, and that fail.
-
-
-@pytest.fixture
-def fake(monkeypatch):
-    """Register a back end "fake" that finds what a function of the sample says."""
-
-    def register(find, capabilities=Capability.ROBUST | Capability.EXACT):
-        home = BackEnd(capabilities, (), (1e-6, 1e-10), lambda problem: SimpleNamespace(find=find))
-        monkeypatch.setitem(backends.REGISTRY._registered, "fake", home)
-
-    return register
-
-
-N, V = 12, 8
-UNUSABLE = {
-    "nan": np.full(N, np.nan),
-    "one nan": np.append(np.zeros(N - 1), np.nan),
-    "infinite": np.full(N, np.inf),
-    "too short": np.zeros(N - 1),
-    "one number": np.array(1e-3),
-    "one number in a list": np.array([1e-3]),
-    "a matrix": np.zeros((N, 1)),
-}
-
-
-@pytest.mark.parametrize("forces", UNUSABLE.values(), ids=UNUSABLE)
-def test_unusable_forces_are_a_failure_and_the_last_ones_stay(fake, forces):
-    fake(lambda *sample: Found(forces, np.full(V, 1 / V), claimed=True))
-    case = CASES["5 mm, random 0"]
-    found = solve(case.problem, case.command, case.previous, backend="fake")
-    assert found.status is AllocationStatus.FAILED
-    assert found.claimed
-    assert np.array_equal(found.forces, case.previous)
-
-
-WRONG = {
-    "zero": np.zeros(N),
-    "full": np.full(N, oracle.MAX_FORCE),
-    "far outside": np.full(N, 1e6),
-    "beyond squares": np.full(N, -1e300),
-    "half": np.full(N, oracle.MAX_FORCE / 2),
-}
-WEIGHTS = {
-    "equal": np.full(V, 1 / V),
-    "none": None,
-    "nan": np.full(V, np.nan),
-    "negative": -np.ones(V),
-    "zero": np.zeros(V),
-    "too many": np.ones(V + 1),
-    "huge": np.full(V, 1e300),
-}
-
-
-@pytest.mark.parametrize("forces", WRONG.values(), ids=WRONG)
-@pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
-def test_a_liar_is_not_certified(fake, forces, weights):
-    fake(lambda *sample: Found(forces, weights, claimed=True))
-    case = CASES["5 mm, random 0"]
-    found = solve(case.problem, case.command, case.previous, backend="fake")
-    assert found.status is AllocationStatus.NOT_CERTIFIED
-    assert is_inside(case, found.forces)
-    best = answer("clarabel", "5 mm, random 0")
-    assert found.objective - found.duality_gap <= best.objective  # even a liar's bound holds
-    assert abs(found.vertex_weights.sum() - 1) < 1e-12
-
-
-@pytest.mark.parametrize("weights", WEIGHTS.values(), ids=WEIGHTS)
-def test_good_forces_are_certified_whatever_the_multipliers(fake, weights):
-    best = answer("ipopt", "5 mm, random 0").forces
-    fake(lambda *sample: Found(best, weights, claimed=False))
-    case = CASES["5 mm, random 0"]
-    found = solve(case.problem, case.command, case.previous, backend="fake")
-    assert found.status is AllocationStatus.OPTIMAL
-    assert not found.claimed
-
-
-@pytest.mark.parametrize("error", [RuntimeError("it broke"), TypeError("it broke"), ZeroDivisionError("it broke")])
-def test_a_back_end_that_raises_is_heard(fake, error):
-    def find(*sample):
-        raise error
-
-    fake(find)
-    with pytest.raises((type(error), GncError), match="it broke"):
-        solve(CASES["no error"].problem, oracle.COMMAND, backend="fake")
-
-
-# What is imported, and what is printed.
-
-
-def run(code: str, *arguments: str) -> subprocess.CompletedProcess:
-    folder = {"PYTHONPATH": str(Path(oracle.__file__).parent)}
-    command = [sys.executable, "-c", code, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, env={**os.environ, **folder})
-
-
-def test_solvers_are_imported_when_first_used():
-    heavy = ["clarabel", "cvxpy", "daqp", "highspy", "osqp", "piqp", "proxsuite", "qpsolvers", "scipy", "scs"]
-    code = "import sys, casadi_gnc.allocation as a; a.backends.names(); print([m for m in %r if m in sys.modules])"
-    done = run(code % heavy)
-    assert done.stdout.strip() == "[]", done.stderr
-    code = "import sys; from casadi_gnc.allocation import backends as b; b.available(); "
-    code += "print([m for m in %r if m in sys.modules])"
-    done = run(code % [m for m in heavy if m != "scipy"])
-    assert done.stdout.strip() == "[]", done.stderr
-
-
-QUIET = """
-import sys, warnings; warnings.simplefilter("error")
-import allocation_cases as oracle
-from casadi_gnc.allocation import Allocator, backends
-name = sys.argv[1]
-robust = backends.Capability.ROBUST in backends.module(name).CAPABILITIES
-problems = [oracle.huang2020(0.0, effort_weight=0.0, change_weight=0.0)]
-problems += [oracle.huang2020(), oracle.huang2020(max_step=2e-4)] if robust and name != "sdp_scs" else []
-for problem in problems:
-    Allocator(problem, name).solve(oracle.COMMAND, [1e-3] * 12)
-"""
-
-
-def made_of(name: str) -> str:
-    """Name a back end with the packages it is made of and their versions: what to look at when it changes."""
-    known = metadata.packages_distributions()
-    imported = ("casadi", *backends.module(name).REQUIRES)
-    if name.startswith(backends.QPSOLVERS):
-        imported += (name.removeprefix(backends.QPSOLVERS),)
-    found = sorted({one for package in imported for one in known.get(package, [])})
-    return f"{name}, made of {', '.join(f'{one} {metadata.version(one)}' for one in found)}"
-
-
-def assert_quiet(name: str, code: str) -> None:
-    """Banners and complaints of C libraries go around sys.stdout, so look at the process."""
-    done = run(code, name)
-    said = done.stdout + done.stderr
-    assert done.returncode == 0, f"{made_of(name)}, ended with {done.returncode}: {said}"
-    assert not said, f"{made_of(name)}, is not quiet: {said}"
-
-
-@pytest.mark.parametrize("made", [one for one in NAMES if backends.module(one).REQUIRES or one == "online"])
-def test_each_is_quiet(made):
-    """Those that are made of something: Python alone prints what it is told to."""
-    assert_quiet(need(made), QUIET)
-
-
-def test_highs_is_quiet_by_its_name_in_qpsolvers():
-    need("highs")
-    assert_quiet("qpsolvers:highs", QUIET)
-
-
-def test_one_that_is_not_quiet_is_told_with_its_version():
-    """The package to blame stands in the message, with its version and what it said."""
-    version = metadata.version("highspy")
-    with pytest.raises(AssertionError, match=rf"^highs, made of .*highspy {version}, .*is not quiet: Copyright"):
-        assert_quiet("highs", "print('Copyright')")
 
 
 def test_registry_says_what_there_is(name):
