@@ -116,10 +116,10 @@ def campaign(
     except BaseException as error:
         if out is None:
             shutil.rmtree(folder, ignore_errors=True)
-        if isinstance(error, OSError):  # a full disk, a share that went away
+        if isinstance(error, OSError):  # a full disk, a share that went away, a folder in the place of a file
             raise CampaignError(
-                f"cannot write to {str(folder)!r}: {error.strerror or error}; what is finished is kept, and the same "
-                "command goes on from there"
+                f"cannot write to {str(error.filename2 or folder)!r}: {error.strerror or error}; what is finished is "
+                "kept, and the same command goes on from there"
             ) from error
         raise
     return Campaign(folder, cases, temporary=out is None)

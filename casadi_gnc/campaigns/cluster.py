@@ -21,8 +21,8 @@ from casadi_gnc.campaigns.engines import CompiledBatch
 from casadi_gnc.campaigns.program import BatchEngine, Flown, Program, T, Told
 from casadi_gnc.errors import CampaignError, GncError
 
-#: Seconds in which a scheduler must answer, and in which it must have a worker.
-_PATIENCE = 10.0
+#: Seconds in which a scheduler must answer, and then those in which it must have a worker.
+_ANSWER, _WORKER = 10.0, 10.0
 #: Workers that may be lost with one part before it is given up.
 _LOSSES = 10
 
@@ -83,7 +83,7 @@ class DaskBatch(BatchEngine):
                     silence_logs=logging.CRITICAL,
                 )
         try:
-            self._client = distributed.Client(self._cluster or scheduler, timeout=_PATIENCE, set_as_default=False)
+            self._client = distributed.Client(self._cluster or scheduler, timeout=_ANSWER, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             self._end()
             told = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -92,7 +92,7 @@ class DaskBatch(BatchEngine):
                 "address that it told"
             ) from None
         try:
-            self._client.wait_for_workers(1, timeout=_PATIENCE)
+            self._client.wait_for_workers(1, timeout=_WORKER)
         except TimeoutError:
             self.close()
             raise CampaignError(
@@ -147,12 +147,12 @@ class DaskBatch(BatchEngine):
 
     def close(self) -> None:
         """End the connection, and the workers that were started here."""
-        self._client.close(timeout=_PATIENCE)
+        self._client.close(timeout=_ANSWER)
         self._end()
 
     def _end(self) -> None:
         if self._cluster is not None:
-            self._cluster.close(timeout=_PATIENCE)
+            self._cluster.close(timeout=_ANSWER)
 
 
 def _module(name: str) -> Any:

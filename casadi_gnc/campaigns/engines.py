@@ -108,19 +108,18 @@ class CompiledBatch(BatchEngine):
         self._fly = library.gnc_fly_batch
         self._fly.restype, self._fly.argtypes = None, [ctypes.POINTER(_Batch)]
         self.threads = threads or os.cpu_count() or 1
-        self._workspaces = [np.zeros(program.workspace) for _ in range(self.threads)]
 
     def fly(self, values: np.ndarray, seeds: np.ndarray, told: Told | None = None) -> Flown:
-        """Fly cases to their end, as `BatchEngine.fly`."""
+        """Fly cases to their end, as `BatchEngine.fly`; several threads may call it at once."""
         program, cases = self.program, len(seeds)
         p = np.ascontiguousarray(values, dtype=float)
         seeds = np.ascontiguousarray(seeds, dtype=np.uint64)
         columns = {name: np.zeros((cases, width)) for name, width in program.widths.items()}
         run = max(self.lanes, -(-cases // (8 * self.threads * self.lanes)) * self.lanes)
-        free = list(range(self.threads))
+        free = [np.zeros(program.workspace) for _ in range(self.threads)]
 
         def part(first: int) -> int:
-            last, mine = min(first + run, cases), free.pop()
+            last, workspace = min(first + run, cases), free.pop()
             try:
                 rows = {name: column[first:last] for name, column in columns.items()}
                 batch = _Batch(
@@ -130,12 +129,12 @@ class CompiledBatch(BatchEngine):
                     flights=last - first,
                     samples=program.samples,
                     allocation_data=program.data.ctypes.data,
-                    allocation_work=self._workspaces[mine].ctypes.data,
+                    allocation_work=workspace.ctypes.data,
                     **{name: row.ctypes.data for name, row in rows.items()},
                 )
                 self._fly(ctypes.byref(batch))
             finally:
-                free.append(mine)
+                free.append(workspace)
             return last - first
 
         starts = range(0, cases, run)

@@ -14,7 +14,7 @@ import numpy as np
 
 from casadi_gnc.campaigns.cases import Cases
 from casadi_gnc.campaigns.ledger import read_identity
-from casadi_gnc.campaigns.store import MISSING, SHORT, WHOLE, Columns, Store, shards
+from casadi_gnc.campaigns.store import MISSING, SHORT, WHOLE, Columns, Store
 from casadi_gnc.campaigns.summary import badness, summarised
 from casadi_gnc.errors import CampaignError, offer
 from casadi_gnc.missions.flight import Flight
@@ -83,8 +83,8 @@ class Campaign:
 
     @cached_property
     def _states(self) -> dict[int, str]:
-        """The state of each shard when it was first asked for."""
-        return {number: self._store.state(number) for number, _, _ in shards(self.identity)}
+        """The state of each shard that is begun, when it was first asked for."""
+        return {number: self._store.state(number) for number in self._store.begun()}
 
     @property
     def damaged(self) -> list[str]:
@@ -176,7 +176,7 @@ class Campaign:
         """Return why a case has no row."""
         if number >= self.identity["cases"]:
             return f"there are cases 0 to {self.identity['cases'] - 1}"
-        state = self._states[number // self.identity["shard"]]
+        state = self._states.get(number // self.identity["shard"], MISSING)
         return f"{'it is not flown yet' if state in (WHOLE, MISSING, SHORT) else state}; run the campaign again"
 
     def _number(self, told: str) -> int:

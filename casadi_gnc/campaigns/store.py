@@ -98,6 +98,13 @@ class Store:
         entry = entry_of(self.identity, int(columns["case"][0]), len(columns["case"]), _hash(place))
         _put_text(place.with_suffix(".json"), json.dumps(entry) + "\n")
 
+    def begun(self) -> list[int]:
+        """Return the shards that the ledger knows, in their order; all others are `MISSING`."""
+        count = -(-self.identity["cases"] // self.identity["shard"])
+        names = [path.stem.removeprefix("shard-") for path in self.folder.glob("shard-*.json")]
+        numbers = sorted(int(name) for name in names if name.isdecimal() and name == f"{int(name):05d}")
+        return [number for number in numbers if number < count]
+
     def state(self, shard: int) -> str:
         """Return `WHOLE`, `MISSING`, `SHORT`, or why the table of a shard cannot be trusted."""
         place = self.place(shard)
