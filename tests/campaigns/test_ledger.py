@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 
 import pytest
+from tumbling import flown
 
-import casadi_gnc
-from casadi_gnc.campaigns import DispersionTable
 from casadi_gnc.campaigns.ledger import entry_of, read_entry, read_identity
 from casadi_gnc.campaigns.result import Campaign
 from casadi_gnc.errors import CampaignError
@@ -94,20 +93,12 @@ def test_an_entry_is_of_a_campaign_however_far_it_has_grown():
     assert here["campaign"] != other["campaign"]
 
 
-def flown(out, **options):
-    mission = casadi_gnc.load("huang2020/detumble").with_scheme("observer_pinv")
-    short = mission.with_timing(duration=400 * mission.timing.sample_period)
-    rates = DispersionTable(key="initial.rate_rad_per_s", uniform=[-0.05, 0.05])
-    return casadi_gnc.campaign(short, 100, dispersions=[rates], out=out, **options)
-
-
 @pytest.mark.slow
-def test_files_of_another_campaign_or_place_are_named_and_flown_again(tmp_path, monkeypatch):
+def test_files_of_another_campaign_or_place_are_named_and_flown_again(tmp_path, small_shards):
     """Whoever puts folders together by hand may take one of another seed, or rename a shard."""
-    monkeypatch.setattr("casadi_gnc.campaigns.campaign._SHARD_SAMPLES", 400 * 16)
     here, other = tmp_path / "here", tmp_path / "other"
-    cases = flown(here).cases
-    flown(other, seed=1)
+    cases = flown(out=here).cases
+    flown(out=other, seed=1)
     kept = {path.name: path.read_bytes() for path in here.iterdir()}
     (table,) = [name for name in kept if name.startswith("shard-00000") and not name.endswith(".json")]
     suffix = table.rpartition(".")[2]
@@ -136,7 +127,7 @@ def test_files_of_another_campaign_or_place_are_named_and_flown_again(tmp_path, 
     with pytest.raises(CampaignError, match="case 100 is not kept: there are cases 0 to 99"):
         found.case(100)
     told = []
-    flown(here, said=told.append)
+    flown(out=here, said=told.append)
     assert told[:5] == [f"{sentence}; it is flown again" for sentence in found.damaged]
     assert {path.name: path.read_bytes() for path in here.iterdir()} == kept
 
@@ -146,7 +137,7 @@ def test_a_table_that_is_none_is_told_in_a_sentence(tmp_path):
     """One whose hash was made to fit."""
     import hashlib
 
-    made = flown(tmp_path)
+    made = flown(out=tmp_path)
     (table,) = [path for path in tmp_path.glob("shard-*") if path.suffix != ".json"]
     entry = table.with_suffix(".json")
     for text in (b"", b"none", b"PK\x03\x04" + bytes(40)):
