@@ -2,21 +2,27 @@
 
 Where JAX is installed, also against the same tapes in JAX, compiled for all flights at once.
 
-python tests/bench/campaign_speed.py [--flights N]
+python tests/bench/campaign_speed.py [--flights N] [--detumbles N]
+
+With `--detumbles` only N whole de-tumbles fly, of 15,001 samples, by each kind of lanes, in scalar C and in JAX, once;
+and the time of the builds is told, which are made anew.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
+import tempfile
 import time
 
 import numpy as np
 
 import casadi_gnc
 from casadi_gnc.campaigns.engines import CompiledBatch, best_vectors
+from casadi_gnc.campaigns.program import program_of
 from casadi_gnc.missions.flying import fly
-from casadi_gnc.missions.parameters import vary
+from casadi_gnc.missions.parameters import Varied, vary
 
 #: Missions with what varies.
 FLOWN = {
@@ -27,51 +33,89 @@ FLOWN = {
 }
 
 
-def seconds(batch: CompiledBatch, values: np.ndarray) -> float:
-    """Return the processor time of flying some cases, the least of three."""
+#: What differs among whole de-tumbles.
+DISPERSED = ["truth.inertia_factor", "truth.centre_of_mass_error_m", "initial.rate_rad_per_s"]
+
+
+def seconds(batch: CompiledBatch, values: np.ndarray, repeats: int = 3) -> float:
+    """Return the processor time of flying some cases, the least of some repeats."""
     times = []
-    for _ in range(3):
+    for _ in range(repeats):
         begun = time.process_time()
         batch.fly(values, np.arange(len(values), dtype=np.uint64))
         times.append(time.process_time() - begun)
     return min(times)
 
 
-def against_jax(flights: int) -> None:
-    """Print how much longer JAX takes for the de-tumble, in processor time; it compiles before it is timed."""
+def against_jax(varied: Varied, values: np.ndarray, repeats: int = 3) -> float:
+    """Print how much longer JAX takes for the same flights, in processor time; it compiles before it is timed."""
     import jax_flight
 
-    mission = casadi_gnc.load("huang2020/detumble").with_timing(duration=100.0)
-    keys = ["truth.inertia_factor", "truth.centre_of_mass_error_m", "initial.rate_rad_per_s"]
-    varied = vary(mission, keys, "observer_pinv")
-    values = varied.parameters.nominal * (1 + 0.01 * np.sin(np.arange(flights))[:, None])
-    theirs, ours = jax_flight.flights(varied), CompiledBatch(varied)
+    flights = len(values)
+    theirs, ours = jax_flight.flights(varied), CompiledBatch(varied, threads=1)
     begun = time.perf_counter()
     tallies = theirs(values)
     built, times = time.perf_counter() - begun, []
     apart = np.abs(tallies - ours.fly(values, np.zeros(flights, dtype=np.uint64)).tally).max()
-    for _ in range(3):
+    for _ in range(repeats):
         begun = time.process_time()
         theirs(values)
         times.append(time.process_time() - begun)
-    ratio = min(times) / seconds(ours, values)
-    print(f"JAX, {flights} de-tumbles of {mission.timing.samples} samples: {ratio:.1f} times as long as {ours.vectors} "
-          f"lanes; compiled in {built:.0f} s; tallies within {apart:.0e}")  # fmt: skip
+    ratio = min(times) / seconds(ours, values, repeats)
+    print(f"JAX, {flights} de-tumbles of {varied.nominal.timing.samples} samples: {ratio:.1f} times as long as "
+          f"{ours.vectors} lanes; first call {built:.0f} s; tallies within {apart:.0e}", flush=True)  # fmt: skip
+    return min(times)
+
+
+def dispersed(varied: Varied, flights: int) -> np.ndarray:
+    """Return parameters of so many flights, (flights, P)."""
+    return varied.parameters.nominal * (1 + 0.01 * np.sin(np.arange(flights))[:, None])
+
+
+def detumbles(flights: int, kinds: list[str]) -> None:
+    """Print what builds take, and how long whole de-tumbles fly."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["CASADI_GNC_CACHE"] = folder
+        begun, spent = time.perf_counter(), os.times()
+        varied = vary(casadi_gnc.load("huang2020/detumble"), DISPERSED, "observer_pinv")
+        program = program_of(varied)
+        batches = {}
+        for kind in ("none", *kinds):
+            batches[kind] = CompiledBatch(program, vectors=kind, threads=1)
+            now = os.times()
+            used = sum(now[:4]) - sum(spent[:4])
+            print(
+                f"build with {kind}: {used:.1f} s of processor time, {time.perf_counter() - begun:.1f} s by the clock"
+            )
+            begun, spent = time.perf_counter(), os.times()
+    values = dispersed(varied, flights)
+    taken = {kind: seconds(batch, values, 1) for kind, batch in batches.items()}
+    samples = flights * program.samples / 1e6
+    for kind in kinds:
+        print(f"{flights} de-tumbles of {program.samples} samples: {kind} {taken['none'] / taken[kind]:.2f} times "
+              f"scalar, {samples / taken[kind]:.1f} million samples a second", flush=True)  # fmt: skip
+    if importlib.util.find_spec("jax"):
+        theirs = against_jax(varied, values, 1)
+        print(", ".join(f"{theirs / taken[kind]:.1f} times as long as {kind}" for kind in taken))
 
 
 def main() -> None:
     """Print a line for each mission."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--flights", type=int, default=128)
-    flights = parser.parse_args().flights
-    best = best_vectors()
+    parser.add_argument("--detumbles", type=int, metavar="N", help="fly so many whole de-tumbles instead, once")
+    asked = parser.parse_args()
+    flights, best = asked.flights, best_vectors()
     kinds = [kind for kind in ("avx2", "avx512") if best == "avx512" or kind == best] or [best]
+    if asked.detumbles:
+        detumbles(asked.detumbles, kinds)
+        return
     print(f"{flights} flights a mission, one thread, processor time; lanes: {', '.join(kinds)}")
     for name, (scheme, keys, duration) in FLOWN.items():
         mission = casadi_gnc.load(name)
         mission = mission.with_timing(duration=duration) if duration else mission
         varied = vary(mission, keys, scheme)
-        values = varied.parameters.nominal * (1 + 0.01 * np.sin(np.arange(flights))[:, None])
+        values = dispersed(varied, flights)
         scalar = CompiledBatch(varied, vectors="none", threads=1)
         alone = seconds(scalar, values)
         told = []
@@ -88,7 +132,8 @@ def main() -> None:
             f"{rebuilt / (alone / flights):.0f} scalar ones"
         )
     if importlib.util.find_spec("jax"):
-        against_jax(8 * flights)
+        varied = vary(casadi_gnc.load("huang2020/detumble").with_timing(duration=100.0), DISPERSED, "observer_pinv")
+        against_jax(varied, dispersed(varied, 8 * flights))
 
 
 if __name__ == "__main__":
