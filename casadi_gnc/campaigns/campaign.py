@@ -98,7 +98,7 @@ def campaign(
     folder = Path(tempfile.mkdtemp(prefix="casadi-gnc-campaign-")) if out is None else Path(out)
     try:
         size = shard_size(flown.timing.samples)
-        store = Store(folder, identity_of(cases, flights, varying, plan, maths, size))
+        store = Store.prepared(folder, identity_of(cases, flights, varying, plan, maths, size))
         if flown.origin is not None:
             keep_texts(folder, texts_of(flown.origin, varying))
         program = program_of(cases.varied, maths)

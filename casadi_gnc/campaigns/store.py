@@ -46,43 +46,49 @@ def has_arrow() -> bool:
 
 
 class Store:
-    """Keep the shards of one campaign in a folder.
+    """Keep the shards of one campaign in a folder, which need only be readable as long as nothing is written.
 
     Parameters
     ----------
-    folder : made if it does not exist.
+    folder : that holds the campaign.
     identity : of the campaign, data that JSON can hold; `cases` and `shard` are the numbers of cases in all and in
         a shard.
-
-    Raises
-    ------
-    CampaignError
-        Where the folder holds another campaign.
     """
 
     def __init__(self, folder: Path, identity: dict[str, Any]) -> None:
-        self.folder = prepare_folder(folder)
-        self.identity = identity
-        place = folder / IDENTITY
-        if place.exists():
-            self.identity = self._grown(read_identity(folder), identity)
-        if not place.exists() or self.identity is identity:
-            _put_text(place, json.dumps(identity, indent=2) + "\n")
-        self.suffix = self.identity["table"]
+        self.folder, self.identity = folder, identity
+        self.suffix = identity["table"]
 
-    def _grown(self, known: dict[str, Any], asked: dict[str, Any]) -> dict[str, Any]:
+    @classmethod
+    def prepared(cls, folder: Path, asked: dict[str, Any]) -> Store:
+        """Return the store of a campaign that is to be flown, in a folder that is made if it does not exist.
+
+        Raises
+        ------
+        CampaignError, OutputError
+            Where the folder holds another campaign, or cannot be written.
+        """
+        place, identity = prepare_folder(folder) / IDENTITY, asked
+        if place.exists():
+            identity = cls._grown(folder, read_identity(folder), asked)
+        if not place.exists() or identity is asked:
+            _put_text(place, json.dumps(asked, indent=2) + "\n")
+        return cls(folder, identity)
+
+    @staticmethod
+    def _grown(folder: Path, known: dict[str, Any], asked: dict[str, Any]) -> dict[str, Any]:
         """Return what the folder is to say: what it says already, or the same with more cases."""
         apart = [name for name in asked if name != "cases" and known.get(name) != asked[name]]
         if apart:
             fixed = apart == ["plan"] and known["plan_name"] == asked["plan_name"] and known["cases"] != asked["cases"]
             why = "such a plan is made for its number of cases and cannot grow; " if fixed else ""
             raise CampaignError(
-                f"{self.folder} holds another campaign: its {apart[0]} is {short(known.get(apart[0]))}, and this "
+                f"{folder} holds another campaign: its {apart[0]} is {short(known.get(apart[0]))}, and this "
                 f"one's is {short(asked[apart[0]])}; {why}give another folder"
             )
         if asked["cases"] < known["cases"]:
             raise CampaignError(
-                f"{self.folder} holds a campaign of {known['cases']} cases, and {asked['cases']} are asked for; "
+                f"{folder} holds a campaign of {known['cases']} cases, and {asked['cases']} are asked for; "
                 "ask for as many or more, or give another folder"
             )
         return known if asked["cases"] == known["cases"] else asked
@@ -128,7 +134,13 @@ class Store:
         """Return the columns of a shard, all or those named; raise `CampaignError` where it is no such table."""
         place = self.place(shard)
         try:
-            return _read(place, names)
+            found = _read(place, names)
+            cases = read_entry(place.with_suffix(".json"))["cases"]
+            if any(len(column) != cases for column in found.values()):
+                raise ValueError("it has other rows than the ledger says")
+            if any(column.dtype.kind not in "biuf" for name, column in found.items() if name != "refused"):
+                raise ValueError("it has words in the place of numbers")
+            return found
         except (OSError, ValueError, KeyError, zipfile.BadZipFile) as error:
             raise CampaignError(
                 f"{place} is no table of this campaign; delete it and run the campaign again"

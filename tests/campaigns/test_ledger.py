@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 
 import pytest
@@ -9,7 +10,7 @@ from tumbling import flown
 
 from casadi_gnc.campaigns.ledger import entry_of, read_entry, read_identity
 from casadi_gnc.campaigns.result import Campaign
-from casadi_gnc.errors import CampaignError
+from casadi_gnc.errors import CampaignError, OutputError
 
 IDENTITY = {
     "format": 1,
@@ -134,15 +135,39 @@ def test_files_of_another_campaign_or_place_are_named_and_flown_again(tmp_path, 
 
 @pytest.mark.slow
 def test_a_table_that_is_none_is_told_in_a_sentence(tmp_path):
-    """One whose hash was made to fit."""
-    import hashlib
+    """One whose hash was made to fit: no table, one of fewer rows, one of words."""
+    import pyarrow.parquet as pq
 
     made = flown(out=tmp_path)
-    (table,) = [path for path in tmp_path.glob("shard-*") if path.suffix != ".json"]
-    entry = table.with_suffix(".json")
-    for text in (b"", b"none", b"PK\x03\x04" + bytes(40)):
+    (table,) = tmp_path.glob("shard-*.parquet")
+    entry, whole, metric = table.with_suffix(".json"), pq.read_table(table), "metric.final_rate"
+    words = whole.set_column(whole.column_names.index(metric), metric, [["x"] * whole.num_rows])
+
+    def changed(to):
+        pq.write_table(to, tmp_path / "other")
+        return (tmp_path / "other").read_bytes()
+
+    for text in (b"", b"none", b"PK\x03\x04" + bytes(40), changed(whole.slice(0, 3)), changed(words)):
         table.write_bytes(text)
         told = {**json.loads(entry.read_text()), "sha256": hashlib.sha256(text).hexdigest()}
         entry.write_text(json.dumps(told))
         with pytest.raises(CampaignError, match="is no table of this campaign; delete it and run the campaign again"):
-            len(Campaign(tmp_path, made.cases))
+            Campaign(tmp_path, made.cases).column(metric)
+
+
+@pytest.mark.slow
+def test_a_folder_that_may_only_be_read_is_enough_to_look_at(tmp_path, monkeypatch):
+    """That of a colleague, or of an archive; whoever is root may write everywhere, so writing is refused here."""
+
+    def refused(folder):
+        raise OutputError(f"cannot write to the output folder {str(folder)!r}")
+
+    found = flown(out=tmp_path)
+    kept = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    monkeypatch.setattr("casadi_gnc.campaigns.store.prepare_folder", refused)
+    again = Campaign(tmp_path, found.cases)
+    assert again.summary() == found.summary()
+    assert again.worst("final_rate").number == found.worst("final_rate").number
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == kept
+    with pytest.raises(OutputError, match="cannot write to the output folder"):
+        flown(out=tmp_path)
