@@ -80,6 +80,7 @@ class DaskBatch(BatchEngine):
                     threads_per_worker=1,
                     processes=True,
                     dashboard_address=None,
+                    scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # its server of pages has any free port
                     silence_logs=logging.CRITICAL,
                 )
         try:

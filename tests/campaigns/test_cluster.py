@@ -35,7 +35,8 @@ def waited(look):
 
 
 def program(name, *arguments, **options):
-    return subprocess.Popen([sys.executable, "-m", f"distributed.cli.{name}", *arguments, "--no-dashboard"], **options)
+    quiet = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")  # pages on any free port
+    return subprocess.Popen([sys.executable, "-m", f"distributed.cli.{name}", *arguments, *quiet], **options)
 
 
 @pytest.fixture(scope="module")
@@ -116,7 +117,8 @@ def test_every_mission_has_one_table_in_whatever_parts_it_is_flown(name, cluster
     assert tables(tmp_path / "parts") == found
     assert tables(tmp_path / "dask") == found
     assert serial.flew.sum() >= 256
-    assert len(np.unique(serial.columns([each for each in serial.names if each.startswith("metric.")]), axis=0)) > 1
+    told = np.unique(serial.columns([each for each in serial.names if each.startswith("metric.")]), axis=0)
+    assert len(told) > 1 or name == "tao2019/sweeps"  # which has no metric
 
 
 @pytest.mark.packages("distributed")
