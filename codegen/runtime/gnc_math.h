@@ -129,6 +129,20 @@ GNC_INLINE gnc_pair_ gnc_quotient_(gnc_pair_ n, gnc_pair_ d) {
 /* Polynomials are sums of such blocks times powers of x^3: independent work, so less waiting than Horner. */
 GNC_INLINE double gnc_poly3_(double x, double c0, double c1, double c2) { return c0 + x * (c1 + x * c2); }
 
+/*
+ * A choice between two values: only the chosen one is computed, but both in loops over lanes, whatever is chosen, since
+ * a table that is read under a condition would keep compilers from vector code.
+ */
+#if GNC_LANES
+GNC_INLINE double gnc_choose_(int first, double x, double y) {
+    const uint64_t mask = first != 0 ? ~UINT64_C(0) : 0u;
+    return gnc_from_bits_((gnc_bits_(x) & mask) | (gnc_bits_(y) & ~mask));
+}
+#define GNC_CHOOSE_(condition, x, y) gnc_choose_((condition) ? 1 : 0, (x), (y))
+#else
+#define GNC_CHOOSE_(condition, x, y) ((condition) ? (x) : (y))
+#endif
+
 /* ---- Exact functions ------------------------------------------------------------------------------- */
 
 #if defined(__GNUC__) /* one instruction */
@@ -213,89 +227,137 @@ GNC_INLINE double gnc_remainder(double x, double y) {
 
 /* ---- Exponentials ---------------------------------------------------------------------------------- */
 
-/* e^(x + x_lo) = 2^k (1 + r + t), |r| <= ln(2)/2, t of the order of r^2. */
+/* 2^(j/64) as a pair, 0 <= j < 64. */
+GNC_INLINE gnc_pair_ gnc_exp_node_(uint64_t j) {
+    static const double node[64][2] = {
+        {0x1.0p+0, 0x0.0p+0}, {0x1.02c9a3e778061p+0, -0x1.19083535b085dp-56},
+        {0x1.059b0d3158574p+0, 0x1.d73e2a475b465p-55}, {0x1.0874518759bc8p+0, 0x1.186be4bb284ffp-57},
+        {0x1.0b5586cf9890fp+0, 0x1.8a62e4adc610bp-54}, {0x1.0e3ec32d3d1a2p+0, 0x1.03a1727c57b53p-59},
+        {0x1.11301d0125b51p+0, -0x1.6c51039449b3ap-54}, {0x1.1429aaea92dep+0, -0x1.32fbf9af1369ep-54},
+        {0x1.172b83c7d517bp+0, -0x1.19041b9d78a76p-55}, {0x1.1a35beb6fcb75p+0, 0x1.e5b4c7b4968e4p-55},
+        {0x1.1d4873168b9aap+0, 0x1.e016e00a2643cp-54}, {0x1.2063b88628cd6p+0, 0x1.dc775814a8495p-55},
+        {0x1.2387a6e756238p+0, 0x1.9b07eb6c70573p-54}, {0x1.26b4565e27cddp+0, 0x1.2bd339940e9d9p-55},
+        {0x1.29e9df51fdee1p+0, 0x1.612e8afad1255p-55}, {0x1.2d285a6e4030bp+0, 0x1.0024754db41d5p-54},
+        {0x1.306fe0a31b715p+0, 0x1.6f46ad23182e4p-55}, {0x1.33c08b26416ffp+0, 0x1.32721843659a6p-54},
+        {0x1.371a7373aa9cbp+0, -0x1.63aeabf42eae2p-54}, {0x1.3a7db34e59ff7p+0, -0x1.5e436d661f5e3p-56},
+        {0x1.3dea64c123422p+0, 0x1.ada0911f09ebcp-55}, {0x1.4160a21f72e2ap+0, -0x1.ef3691c309278p-58},
+        {0x1.44e086061892dp+0, 0x1.89b7a04ef80dp-59}, {0x1.486a2b5c13cdp+0, 0x1.3c1a3b69062fp-56},
+        {0x1.4bfdad5362a27p+0, 0x1.d4397afec42e2p-56}, {0x1.4f9b2769d2ca7p+0, -0x1.4b309d25957e3p-54},
+        {0x1.5342b569d4f82p+0, -0x1.07abe1db13cadp-55}, {0x1.56f4736b527dap+0, 0x1.9bb2c011d93adp-54},
+        {0x1.5ab07dd485429p+0, 0x1.6324c054647adp-54}, {0x1.5e76f15ad2148p+0, 0x1.ba6f93080e65ep-54},
+        {0x1.6247eb03a5585p+0, -0x1.383c17e40b497p-54}, {0x1.6623882552225p+0, -0x1.bb60987591c34p-54},
+        {0x1.6a09e667f3bcdp+0, -0x1.bdd3413b26456p-54}, {0x1.6dfb23c651a2fp+0, -0x1.bbe3a683c88abp-57},
+        {0x1.71f75e8ec5f74p+0, -0x1.16e4786887a99p-55}, {0x1.75feb564267c9p+0, -0x1.0245957316dd3p-54},
+        {0x1.7a11473eb0187p+0, -0x1.41577ee04992fp-55}, {0x1.7e2f336cf4e62p+0, 0x1.05d02ba15797ep-56},
+        {0x1.82589994cce13p+0, -0x1.d4c1dd41532d8p-54}, {0x1.868d99b4492edp+0, -0x1.fc6f89bd4f6bap-54},
+        {0x1.8ace5422aa0dbp+0, 0x1.6e9f156864b27p-54}, {0x1.8f1ae99157736p+0, 0x1.5cc13a2e3976cp-55},
+        {0x1.93737b0cdc5e5p+0, -0x1.75fc781b57ebcp-57}, {0x1.97d829fde4e5p+0, -0x1.d185b7c1b85d1p-54},
+        {0x1.9c49182a3f09p+0, 0x1.c7c46b071f2bep-56}, {0x1.a0c667b5de565p+0, -0x1.359495d1cd533p-54},
+        {0x1.a5503b23e255dp+0, -0x1.d2f6edb8d41e1p-54}, {0x1.a9e6b5579fdbfp+0, 0x1.0fac90ef7fd31p-54},
+        {0x1.ae89f995ad3adp+0, 0x1.7a1cd345dcc81p-54}, {0x1.b33a2b84f15fbp+0, -0x1.2805e3084d708p-57},
+        {0x1.b7f76f2fb5e47p+0, -0x1.5584f7e54ac3bp-56}, {0x1.bcc1e904bc1d2p+0, 0x1.23dd07a2d9e84p-55},
+        {0x1.c199bdd85529cp+0, 0x1.11065895048ddp-55}, {0x1.c67f12e57d14bp+0, 0x1.2884dff483cadp-54},
+        {0x1.cb720dcef9069p+0, 0x1.503cbd1e949dbp-56}, {0x1.d072d4a07897cp+0, -0x1.cbc3743797a9cp-54},
+        {0x1.d5818dcfba487p+0, 0x1.2ed02d75b3707p-55}, {0x1.da9e603db3285p+0, 0x1.c2300696db532p-54},
+        {0x1.dfc97337b9b5fp+0, -0x1.1a5cd4f184b5cp-54}, {0x1.e502ee78b3ff6p+0, 0x1.39e8980a9cc8fp-55},
+        {0x1.ea4afa2a490dap+0, -0x1.e9c23179c2893p-54}, {0x1.efa1bee615a27p+0, 0x1.dc7f486a4b6bp-54},
+        {0x1.f50765b6e454p+0, 0x1.9d3e12dd8a18bp-54}, {0x1.fa7c1819e90d8p+0, 0x1.74853f3a5931ep-55}};
+    gnc_pair_ t;
+    t.hi = node[j][0];
+    t.lo = node[j][1];
+    return t;
+}
+
+/* e^(x + x_lo) = 2^k (hi + lo) with 1 <= hi < 2, |lo| < 2^-6 and x = n ln(2)/64 + r. */
 typedef struct {
-    double r, t;
+    double hi, lo;
     uint64_t k;
 } gnc_exp_parts_;
 
-/* k is the integer next to x / ln 2. ln 2 is split so that k times its upper part (42 bits) is exact. */
+/* ln(2)/64 is split so that n times its upper part (36 bits) is exact. */
 GNC_INLINE gnc_exp_parts_ gnc_exp_reduce_(double x, double x_lo) {
-    const double shifted = x * 0x1.71547652b82fep+0 + GNC_ROUNDER_;
-    const double k = shifted - GNC_ROUNDER_;
-    const gnc_pair_ r = gnc_sum_(x - k * 0x1.62e42fefa38p-1, x_lo - k * 0x1.ef35793c7673p-45);
-    const double r2 = r.hi * r.hi, r3 = r.hi * r2;
-    const double p0 = gnc_poly3_(r.hi, 0x1.5555555555555p-3, 0x1.5555555555557p-5, 0x1.1111111111113p-7);
-    const double p3 = gnc_poly3_(r.hi, 0x1.6c16c16c156bep-10, 0x1.a01a01a0182f5p-13, 0x1.a01a01ab5080bp-16);
-    const double p6 = gnc_poly3_(r.hi, 0x1.71de3a6039c59p-19, 0x1.27e4d0c2cc937p-22, 0x1.ae64162a64a83p-26);
-    const double p9 = 0x1.1f84a6dfe7011p-29 + r.hi * 0x1.61e08d3407238p-33;
-    const double p = p0 + r3 * (p3 + r3 * (p6 + r3 * p9));
+    const double shifted = x * 0x1.71547652b82fep+6 + GNC_ROUNDER_;
+    const double n = shifted - GNC_ROUNDER_;
+    const double r = (x - n * 0x1.62e42fefap-7) + (x_lo - n * 0x1.cf79abc9e3b3ap-46), r2 = r * r;
+    const double low = 0.5 + r * 0x1.5555555555252p-3;
+    const double high = (0x1.55555555553d4p-5 + r * 0x1.11111d9625013p-7) + r2 * 0x1.6c16cdf12aa29p-10;
+    const uint64_t count = gnc_bits_(shifted) - gnc_bits_(GNC_ROUNDER_);
+    const gnc_pair_ node = gnc_exp_node_(gnc_bits_(shifted) & 63u);
     gnc_exp_parts_ e;
-    e.r = r.hi;
-    e.t = (0.5 * r2 + r3 * p) + (r.lo + r.lo * r.hi);
-    e.k = gnc_bits_(shifted) - gnc_bits_(GNC_ROUNDER_);
+    e.hi = node.hi;
+    e.lo = node.lo + node.hi * (r + r2 * (low + r2 * high));
+    e.k = ((count + 0x40000u) >> 6) - 0x1000u;
     return e;
 }
 
 /* e^x. All x; max 0.75 ulp. */
 GNC_INLINE double gnc_exp(double x) {
-    const double capped = x > 710.0 ? 710.0 : x; /* the cap overflows, the floor rounds to zero */
-    const gnc_exp_parts_ e = gnc_exp_reduce_(capped < -746.0 ? -746.0 : capped, 0.0);
-    const gnc_pair_ s = gnc_sum_sorted_(1.0, e.r);
-    const double y = gnc_scale_(s.hi + (s.lo + e.t), e.k);
-    return x == x ? y : gnc_nan_();
+    /* The cap overflows or rounds to zero. */
+    const gnc_exp_parts_ e = gnc_exp_reduce_(GNC_CHOOSE_(gnc_fabs(x) < 746.0, x, gnc_copysign(746.0, x)), 0.0);
+    return GNC_CHOOSE_(x == x, gnc_scale_(e.hi + e.lo, e.k), gnc_nan_());
 }
 
-/* e^x = 2^k exp and e^x - 1 = 2^k minus_1, both pairs; shrink = 2^-k, or 2^-60 where less makes no difference. */
-typedef struct {
-    gnc_pair_ exp, minus_1;
-    double shrink;
-    uint64_t k;
-} gnc_expm1_parts_;
+/* e^x - 1 for |x| < 1/8. */
+GNC_INLINE double gnc_expm1_near_(double x) {
+    const double z = x * x, x3 = x * z;
+    const double p0 = gnc_poly3_(x, 0x1.5555555555555p-3, 0x1.5555555555555p-5, 0x1.11111111146ep-7);
+    const double p3 = gnc_poly3_(x, 0x1.6c16c16c18ff6p-10, 0x1.a01a00930ee1p-13, 0x1.a01a00ecbe6ffp-16);
+    const double p = p0 + x3 * (p3 + x3 * (0x1.71f9218da2e29p-19 + x * 0x1.27f6eadb38abep-22));
+    return x + x * (0.5 * x + z * p);
+}
 
-/* For -38 <= x <= 712. Near k = 0 or -1 the terms 1 - 2^-k and r cancel: their sum must be exact. */
-GNC_INLINE gnc_expm1_parts_ gnc_expm1_reduce_(double x) {
-    const gnc_exp_parts_ e = gnc_exp_reduce_(x, 0.0);
-    const double shrink = x > 42.0 ? 0x1p-60 : gnc_exp2i_(0u - e.k);
-    const gnc_pair_ base = gnc_sum_sorted_(1.0, -shrink);
-    const gnc_pair_ m = gnc_sum_sorted_(base.hi, e.r);
-    const gnc_pair_ s = gnc_sum_sorted_(1.0, e.r);
-    gnc_expm1_parts_ p;
-    p.exp = gnc_sum_sorted_(s.hi, s.lo + e.t);
-    p.minus_1 = gnc_sum_sorted_(m.hi, m.lo + (base.lo + e.t));
-    p.shrink = shrink;
-    p.k = e.k;
-    return p;
+/* e^x - 1 elsewhere, for x >= -38. */
+GNC_INLINE double gnc_expm1_far_(double x) {
+    const double limit = x < 0.0 ? 38.0 : 710.0;
+    const gnc_exp_parts_ e = gnc_exp_reduce_(GNC_CHOOSE_(gnc_fabs(x) < limit, x, gnc_copysign(limit, x)), 0.0);
+    const gnc_pair_ s = gnc_sum_(e.hi, x > 42.0 ? -0x1p-60 : -gnc_exp2i_(0u - e.k));
+    return gnc_scale_(s.hi + (s.lo + e.lo), e.k);
 }
 
 /* e^x - 1. All x; max 0.90 ulp. */
 GNC_INLINE double gnc_expm1(double x) {
-    const double capped = x > 710.0 ? 710.0 : x;
-    const gnc_expm1_parts_ e = gnc_expm1_reduce_(capped < -38.0 ? -38.0 : capped);
-    const double y = gnc_scale_(e.minus_1.hi + e.minus_1.lo, e.k);
-    const double finite = x == 0.0 ? x : y; /* keeps -0 */
-    return x == x ? finite : gnc_nan_();
+    const double y = GNC_CHOOSE_(gnc_fabs(x) < 0.125, gnc_expm1_near_(x), gnc_expm1_far_(x));
+    return GNC_CHOOSE_(x == x, y, gnc_nan_());
 }
 
-/* (E + E/(E + 1))/2 with E = e^|x| - 1: no cancellation near zero. All x; max 1.10 ulp. */
+/*
+ * (e^a + sign e^-a)/2 for a >= 0, good where that is above 1/8: with a = n ln(2)/64 + r, both exponentials share the
+ * even and the odd part of e^r - 1.
+ */
+GNC_INLINE double gnc_exp_half_sum_(double a, double sign) {
+    const double x = GNC_CHOOSE_(a < 711.0, a, 711.0);
+    const double shifted = x * 0x1.71547652b82fep+6 + GNC_ROUNDER_;
+    const double n = shifted - GNC_ROUNDER_;
+    const double r = (x - n * 0x1.62e42fefap-7) - n * 0x1.cf79abc9e3b3ap-46, r2 = r * r;
+    const double odd = r + r * r2 * (0x1.5555555555252p-3 + r2 * 0x1.11111d9625013p-7);
+    const double even = r2 * (0.5 + r2 * (0x1.55555555553d4p-5 + r2 * 0x1.6c16cdf12aa29p-10));
+    const uint64_t count = gnc_bits_(shifted) - gnc_bits_(GNC_ROUNDER_), back = 0x40000u - count;
+    const gnc_pair_ up = gnc_exp_node_(gnc_bits_(shifted) & 63u), down = gnc_exp_node_(back & 63u);
+    const uint64_t k = count >> 6;
+    const double ratio = sign * (x > 42.0 ? 0x1p-130 : gnc_exp2i_((back >> 6) - 0x1000u - k));
+    const gnc_pair_ s = gnc_sum_sorted_(up.hi, ratio * down.hi);
+    const double lo = (up.lo + up.hi * (even + odd)) + ratio * (down.lo + down.hi * (even - odd));
+    return gnc_scale_(s.hi + (s.lo + lo), k - 1u);
+}
+
+/* x + x^3 P(x^2) for |x| < 1/8. */
+GNC_INLINE double gnc_sinh_near_(double x) {
+    const double z = x * x;
+    const double p = (0x1.5555555555555p-3 + z * 0x1.11111111146ep-7) +
+                     z * z * (0x1.a01a00930ee1p-13 + z * 0x1.71f9218da2e29p-19);
+    return x + x * z * p;
+}
+
+/* All x; max 1.10 ulp. */
 GNC_INLINE double gnc_sinh(double x) {
     const double a = gnc_fabs(x);
-    const gnc_expm1_parts_ e = gnc_expm1_reduce_(a > 711.0 ? 711.0 : a);
-    const double q = e.minus_1.hi / e.exp.hi;
-    const gnc_pair_ s = gnc_sum_sorted_(e.minus_1.hi, e.shrink * q);
-    const double lo = s.lo + (e.minus_1.lo + e.shrink * (e.minus_1.lo - q * e.exp.lo));
-    const double y = gnc_copysign(gnc_scale_(s.hi + lo, e.k - 1u), x);
-    return x == x ? y : gnc_nan_();
+    const double y = GNC_CHOOSE_(a < 0.125, gnc_sinh_near_(x), gnc_copysign(gnc_exp_half_sum_(a, -1.0), x));
+    return GNC_CHOOSE_(x == x, y, gnc_nan_());
 }
 
-/* (e^|x| + 1/e^|x|)/2. All x; max 0.65 ulp. */
+/* All x; max 0.65 ulp. */
 GNC_INLINE double gnc_cosh(double x) {
-    const double a = gnc_fabs(x);
-    const gnc_expm1_parts_ e = gnc_expm1_reduce_(a > 711.0 ? 711.0 : a);
-    const double q = (e.shrink * e.shrink) / e.exp.hi;
-    const gnc_pair_ s = gnc_sum_sorted_(e.exp.hi, q);
-    const double y = gnc_scale_(s.hi + (s.lo + (e.exp.lo - q * e.exp.lo)), e.k - 1u);
-    return x == x ? y : gnc_nan_();
+    return GNC_CHOOSE_(x == x, gnc_exp_half_sum_(gnc_fabs(x), 1.0), gnc_nan_());
 }
 
 /* tanh(5 j/32) as a pair. The last are never asked for: no j of seven bits is outside. */
@@ -410,7 +472,7 @@ GNC_INLINE double gnc_erf_near_(double x) {
 /* For 1 <= |x|. */
 GNC_INLINE double gnc_erf_far_(double x) {
     const double a = gnc_fabs(x);
-    const double b = a < 6.0 ? a : 6.0;
+    const double b = GNC_CHOOSE_(a < 6.0, a, 6.0);
     const double t = (b - 3.0) / (b + 3.0), t3 = t * t * t;
     const double q_low = gnc_poly3_(t, 0.17900115118135387, -0.32623356004589982, 0.24560380166428189) +
                          t3 * gnc_poly3_(t, -0.15011593634472473, 0.071665850116798019, -0.024392327975932996);
@@ -421,8 +483,8 @@ GNC_INLINE double gnc_erf_far_(double x) {
 
 /* All x; max 1.45 ulp. */
 GNC_INLINE double gnc_erf(double x) {
-    const double y = gnc_fabs(x) < 1.0 ? gnc_erf_near_(x) : gnc_erf_far_(x);
-    return x == x ? y : gnc_nan_();
+    const double y = GNC_CHOOSE_(gnc_fabs(x) < 1.0, gnc_erf_near_(x), gnc_erf_far_(x));
+    return GNC_CHOOSE_(x == x, y, gnc_nan_());
 }
 
 /* ---- Logarithms ------------------------------------------------------------------------------------ */
@@ -430,7 +492,6 @@ GNC_INLINE double gnc_erf(double x) {
 /* x = 2^k m with sqrt(1/2) <= m < sqrt(2), so that log m stays small when k = 0. */
 typedef struct {
     double m, k;
-    uint64_t k_bits;
 } gnc_log_parts_;
 
 GNC_INLINE gnc_log_parts_ gnc_log_reduce_(double x) {
@@ -440,15 +501,14 @@ GNC_INLINE gnc_log_parts_ gnc_log_reduce_(double x) {
     gnc_log_parts_ p;
     p.m = gnc_from_bits_(bits - ((biased - 1024u) << 52));
     p.k = (gnc_from_bits_(gnc_bits_(0x1p52) + biased) - (0x1p52 + 1024.0)) - (up > 1.0 ? 54.0 : 0.0);
-    p.k_bits = biased - 1024u;
     return p;
 }
 
 /*
- * k ln 2 + log(1 + f) + f_lo. With s = f/(2 + f), log(1 + f) = 2 atanh(s) = f - f^2/2 + s (f^2/2 + s^2 P(s^2)).
+ * k ln 2 + log(1 + f). With s = f/(2 + f), log(1 + f) = 2 atanh(s) = f - f^2/2 + s (f^2/2 + s^2 P(s^2)).
  * The sums from large to small keep their errors.
  */
-GNC_INLINE double gnc_log_sum_(double k, double f, double f_lo) {
+GNC_INLINE double gnc_log_sum_(double k, double f) {
     const double s = f / (2.0 + f), z = s * s, z3 = z * z * z;
     const double p0 = gnc_poly3_(z, 0x1.5555555555592p-1, 0x1.999999997fd11p-2, 0x1.24924941fb26cp-2);
     const double p3 = gnc_poly3_(z, 0x1.c71c5200a378ap-3, 0x1.746640cfef102p-3, 0x1.39a186c8ecd3cp-3);
@@ -457,25 +517,155 @@ GNC_INLINE double gnc_log_sum_(double k, double f, double f_lo) {
     const gnc_pair_ b = gnc_sum_sorted_(f, -half.hi);
     const gnc_pair_ a = gnc_sum_sorted_(k * 0x1.62e42fefa38p-1, b.hi);
     const double small = (b.lo - half.lo) + s * (0.5 * f * f + p);
-    return a.hi + (a.lo + (small + (k * 0x1.ef35793c7673p-45 + f_lo)));
+    return a.hi + (a.lo + (small + k * 0x1.ef35793c7673p-45));
 }
 
 /* Natural logarithm. All x; max 0.67 ulp. */
 GNC_INLINE double gnc_log(double x) {
     const gnc_log_parts_ p = gnc_log_reduce_(x);
-    const double y = gnc_log_sum_(p.k, p.m - 1.0, 0.0);
+    const double y = gnc_log_sum_(p.k, p.m - 1.0);
     const double finite = x < gnc_inf_() ? y : x;
     const double positive = x > 0.0 ? finite : -gnc_inf_();
     return x >= 0.0 ? positive : gnc_nan_();
 }
 
-/* log(1 + x): what is lost in rounding 1 + x comes back as a correction. All x; max 0.66 ulp. */
+/*
+ * log1p and pow start from a table: c of ten bits near 1/m in the middle of the j-th of 128 ranges of m, and -log c as
+ * a sum whose larger part is a multiple of 2^-42. On both sides of m = 1, c = 1.
+ */
+typedef struct {
+    double c, hi, lo;
+} gnc_log_node_;
+
+GNC_INLINE gnc_log_node_ gnc_log_node_at_(uint64_t j) {
+    static const double node[128][3] = {
+        {0x1.738p+0, -0x1.7d4eeef5efp-2, 0x1.c9018f8f27d8fp-45}, {0x1.71p+0, -0x1.7664e1239ep-2, 0x1.0c4fb6aeb27afp-44},
+        {0x1.6fp+0, -0x1.70d42e2789p-2, -0x1.1aead337ee287p-45},
+        {0x1.6dp+0, -0x1.6b3bb22359p-2, -0x1.0f6257a933268p-44},
+        {0x1.6bp+0, -0x1.659b57303ep-2, -0x1.f281db0af8efcp-46},
+        {0x1.69p+0, -0x1.5ff3070a79p-2, -0x1.e9e439f105039p-45}, {0x1.67p+0, -0x1.5a42ab0f4dp-2, 0x1.e63af2df7ba69p-50},
+        {0x1.65p+0, -0x1.548a2c3addp-2, -0x1.3167e63081cf7p-45}, {0x1.63p+0, -0x1.4ec97326p-2, -0x1.34d7aaf04d104p-45},
+        {0x1.618p+0, -0x1.4a7373cedp-2, 0x1.9a234ebf35449p-44},
+        {0x1.5f8p+0, -0x1.44a41b463cp-2, -0x1.1ee28f37cf612p-44},
+        {0x1.5d8p+0, -0x1.3ecc460ef6p-2, 0x1.6028627c1300fp-47},
+        {0x1.5b8p+0, -0x1.38ebdb38edp-2, -0x1.90582e67d4cap-45}, {0x1.5ap+0, -0x1.347dd9a988p-2, 0x1.5594dd4c58092p-45},
+        {0x1.58p+0, -0x1.2e8e2bae12p-2, 0x1.67b1e99b72bd8p-45}, {0x1.56p+0, -0x1.2895a13de8p-2, -0x1.a8d7ad24c13fp-44},
+        {0x1.548p+0, -0x1.241558bfd1p-2, -0x1.00fff3228fcadp-44},
+        {0x1.528p+0, -0x1.1e0d0c3371p-2, -0x1.af8f2a9b0d4ap-44},
+        {0x1.51p+0, -0x1.1980d2dd42p-2, -0x1.b7b3a7a361c9ap-45}, {0x1.4fp+0, -0x1.136870293bp-2, 0x1.d3e8499d67123p-44},
+        {0x1.4d8p+0, -0x1.0ed005f658p-2, 0x1.2dc75285aa803p-45},
+        {0x1.4cp+0, -0x1.0a324e2739p-2, -0x1.c6bee7ef4030ep-47},
+        {0x1.4ap+0, -0x1.0402594b4dp-2, -0x1.036b89ef42d7fp-48},
+        {0x1.488p+0, -0x1.feb0233e6p-3, -0x1.f316e32d5e8c7p-45}, {0x1.47p+0, -0x1.f550a564b8p-3, 0x1.323e3a09202fep-45},
+        {0x1.45p+0, -0x1.e8c0252aa6p-3, 0x1.6805b80e8e6ffp-45},
+        {0x1.438p+0, -0x1.df46c0c722p-3, -0x1.a5e82b0b79039p-44},
+        {0x1.42p+0, -0x1.d5c216b4fcp-3, 0x1.1ba91bbca681bp-45},
+        {0x1.408p+0, -0x1.cc320c0176p-3, -0x1.409039a653794p-45}, {0x1.3fp+0, -0x1.c2968558c2p-3, 0x1.cfd73dee38a4p-45},
+        {0x1.3d8p+0, -0x1.b8ef67042p-3, -0x1.87533321788ep-44}, {0x1.3cp+0, -0x1.af3c94e80cp-3, 0x1.a4e633fcd9066p-52},
+        {0x1.3a8p+0, -0x1.a57df28244p-3, -0x1.b99c8ca1d9abbp-44}, {0x1.39p+0, -0x1.9bb362e7ep-3, 0x1.1f2a8a1ce0ffcp-45},
+        {0x1.378p+0, -0x1.91dcc8c34p-3, -0x1.7bc6abddeff46p-44},
+        {0x1.36p+0, -0x1.87fa06520cp-3, -0x1.22120401202fcp-44},
+        {0x1.348p+0, -0x1.7e0afd630cp-3, -0x1.39e7c1d8f1034p-46},
+        {0x1.33p+0, -0x1.740f8f5404p-3, 0x1.0b66c99018aa1p-44},
+        {0x1.318p+0, -0x1.6a079d0f7ap-3, -0x1.5a3f8448d14f5p-44}, {0x1.3p+0, -0x1.5ff3070a7ap-3, 0x1.8586f183bebf2p-44},
+        {0x1.2e8p+0, -0x1.55d1ad4232p-3, -0x1.add94dda647e8p-44},
+        {0x1.2d8p+0, -0x1.4f099f4a24p-3, 0x1.e9bf2fafeaf27p-44}, {0x1.2cp+0, -0x1.44d2b6ccb8p-3, 0x1.70cc16135783cp-46},
+        {0x1.2a8p+0, -0x1.3a8eb2d31ap-3, -0x1.bafb77d5d503ep-46},
+        {0x1.29p+0, -0x1.303d718e48p-3, 0x1.680b5ce3ecb05p-50}, {0x1.28p+0, -0x1.29552f82p-3, 0x1.5b967f4471dfcp-44},
+        {0x1.268p+0, -0x1.1eed90e2dcp-3, -0x1.615637097648fp-46},
+        {0x1.25p+0, -0x1.1478584674p-3, -0x1.563451027c75p-46}, {0x1.24p+0, -0x1.0d77e7cd08p-3, -0x1.cb2cd2ee2f482p-44},
+        {0x1.228p+0, -0x1.02ebb42bf4p-3, 0x1.5a8fa5ce00e5dp-46},
+        {0x1.218p+0, -0x1.f7b79fec38p-4, 0x1.10987e897ed01p-47}, {0x1.2p+0, -0x1.e27076e2bp-4, 0x1.a342c2af0003cp-45},
+        {0x1.1fp+0, -0x1.d4313d66ccp-4, 0x1.9454379135713p-45}, {0x1.1d8p+0, -0x1.beba818148p-4, 0x1.89b78b6df1f57p-44},
+        {0x1.1c8p+0, -0x1.b05b49bee4p-4, -0x1.ff22c18f84a5ep-47},
+        {0x1.1bp+0, -0x1.9ab4246204p-4, 0x1.8a64826787061p-45}, {0x1.1ap+0, -0x1.8c345d6318p-4, -0x1.b20f5acb42a66p-44},
+        {0x1.188p+0, -0x1.765bf23a6cp-4, 0x1.ecbc035c4256ap-48},
+        {0x1.178p+0, -0x1.67bb0726ecp-4, -0x1.f724b69ef5912p-49},
+        {0x1.168p+0, -0x1.590cafdfp-4, -0x1.c284f5722abaap-44}, {0x1.15p+0, -0x1.42edcbea64p-4, -0x1.bc0eeea7c9acdp-46},
+        {0x1.14p+0, -0x1.341d7961bcp-4, -0x1.1d0929983761p-44}, {0x1.13p+0, -0x1.253f62f0ap-4, -0x1.416f8fb69a701p-44},
+        {0x1.118p+0, -0x1.0ed839b554p-4, 0x1.901f46d48abb4p-44},
+        {0x1.108p+0, -0x1.ffae9119b8p-5, -0x1.303374262c554p-45},
+        {0x1.0f8p+0, -0x1.e19070c278p-5, 0x1.fea4664629e86p-45},
+        {0x1.0e8p+0, -0x1.c355dd092p-5, -0x1.f2ccc9abf8388p-45}, {0x1.0dp+0, -0x1.95c830ec9p-5, 0x1.c148297c5feb8p-45},
+        {0x1.0cp+0, -0x1.77458f633p-5, 0x1.181dce586af09p-44}, {0x1.0bp+0, -0x1.58a5bafc9p-5, 0x1.b2b739570ad39p-45},
+        {0x1.0ap+0, -0x1.39e87b9fe8p-5, -0x1.eafd480ad9015p-44}, {0x1.09p+0, -0x1.1b0d98924p-5, 0x1.3401e9ae889bbp-44},
+        {0x1.078p+0, -0x1.d91a66c54p-6, -0x1.e61f1658cfb9ap-45}, {0x1.068p+0, -0x1.9ace7551dp-6, 0x1.d75d97ec7c41p-45},
+        {0x1.058p+0, -0x1.5c45a51b9p-6, 0x1.63bb6216d87d8p-45}, {0x1.048p+0, -0x1.1d7f7eb9fp-6, 0x1.4193a83fcc7a6p-46},
+        {0x1.038p+0, -0x1.bcf712c74p-7, -0x1.c25e097bd9771p-46}, {0x1.028p+0, -0x1.3e7295d26p-7, 0x1.609c1ff29a114p-45},
+        {0x1.018p+0, -0x1.7ee11ebd8p-8, -0x1.749d3c2d23a07p-47}, {0x1.0p+0, 0x0.0p+0, 0x0.0p+0},
+        {0x1.0p+0, 0x0.0p+0, 0x0.0p+0}, {0x1.fap-1, 0x1.82448a388p-7, 0x1.4554412c584ep-44},
+        {0x1.f6p-1, 0x1.432a92598p-6, 0x1.98139928637fep-47}, {0x1.f2p-1, 0x1.c63d2ec15p-6, -0x1.5439ce030a687p-44},
+        {0x1.efp-1, 0x1.149e3e4008p-5, -0x1.2b98a9a4168fdp-44}, {0x1.ebp-1, 0x1.5715c4c04p-5, -0x1.8888ddfc47628p-44},
+        {0x1.e7p-1, 0x1.9a187b574p-5, -0x1.0c22e4ec4d90dp-44}, {0x1.e4p-1, 0x1.ccb73cddd8p-5, 0x1.965c36e09f5fep-44},
+        {0x1.ep-1, 0x1.08598b59e4p-4, -0x1.7e5dd7009902cp-46}, {0x1.ddp-1, 0x1.2207b5c784p-4, 0x1.49d8cfc10c7bfp-44},
+        {0x1.d9p-1, 0x1.4485e03dbcp-4, 0x1.fad46e8d26ab7p-44}, {0x1.d6p-1, 0x1.5e95a4d978p-4, 0x1.1cb7ce1d17171p-44},
+        {0x1.d2p-1, 0x1.8197e2f41p-4, -0x1.c0fe460d20041p-44}, {0x1.cfp-1, 0x1.9c0c32d4d4p-4, -0x1.ab7c09e838668p-44},
+        {0x1.ccp-1, 0x1.b6ac88dad4p-4, 0x1.b1bdff50225c7p-44}, {0x1.c9p-1, 0x1.d179788218p-4, 0x1.36433b5efbeedp-44},
+        {0x1.c6p-1, 0x1.ec739830ap-4, 0x1.11fcba80cdd1p-44}, {0x1.c2p-1, 0x1.08598b59e4p-3, -0x1.7e5dd7009902cp-45},
+        {0x1.bfp-1, 0x1.160c8024b2p-3, 0x1.ec2d2a9009e3dp-45}, {0x1.bcp-1, 0x1.23d712a49cp-3, 0x1.00d238fd3df5cp-46},
+        {0x1.b9p-1, 0x1.31b994d3a4p-3, 0x1.f098ee3a5081p-44}, {0x1.b6p-1, 0x1.3fb45a5992p-3, 0x1.19713c0cae559p-44},
+        {0x1.b3p-1, 0x1.4dc7b897bcp-3, 0x1.c79b60ae1ff0fp-47}, {0x1.b1p-1, 0x1.5737cc9018p-3, 0x1.9baa7a6b887f6p-44},
+        {0x1.aep-1, 0x1.6574ebe8c2p-3, -0x1.98c1d34f0f462p-44}, {0x1.abp-1, 0x1.73cb9074fep-3, -0x1.d66a90d0005a6p-44},
+        {0x1.a8p-1, 0x1.823c16551ap-3, 0x1.e0ddb9a631e83p-46}, {0x1.a5p-1, 0x1.90c6db9fccp-3, -0x1.935f57718d7cap-46},
+        {0x1.a3p-1, 0x1.9a8778debap-3, 0x1.470fa3efec39p-44}, {0x1.ap-1, 0x1.a93ed3c8aep-3, -0x1.8724350562169p-45},
+        {0x1.9dp-1, 0x1.b811730b82p-3, 0x1.e90683b9cd768p-46}, {0x1.9bp-1, 0x1.c2028ab18p-3, -0x1.92e0ee55c7ac6p-45},
+        {0x1.98p-1, 0x1.d1037f2656p-3, -0x1.84a7e75b6f6e4p-47}, {0x1.96p-1, 0x1.db13db0d48p-3, 0x1.2806a847527e6p-44},
+        {0x1.93p-1, 0x1.ea4449f04ap-3, 0x1.5e91663732a36p-44}, {0x1.91p-1, 0x1.f474b134ep-3, -0x1.bae49f1df7b5ep-44},
+        {0x1.8ep-1, 0x1.01eae5626cp-2, 0x1.a43dcfade85aep-44}, {0x1.8cp-1, 0x1.07138604d6p-2, -0x1.e76324e912b17p-44},
+        {0x1.8ap-1, 0x1.0c42d67616p-2, 0x1.7188b163ceae9p-45}, {0x1.87p-1, 0x1.14167ef367p-2, 0x1.e0c07824daaf5p-44},
+        {0x1.85p-1, 0x1.1956d3b9bcp-2, 0x1.7d2f73ad1aa14p-45}, {0x1.83p-1, 0x1.1e9e16788ap-2, -0x1.82eaed3c8b65ep-44},
+        {0x1.8p-1, 0x1.269621134ep-2, -0x1.1b61f10522625p-44}, {0x1.7ep-1, 0x1.2bef07cdc9p-2, 0x1.a9cfa4a5004f4p-45},
+        {0x1.7cp-1, 0x1.314f1e1d36p-2, -0x1.8e27ad3213cb8p-45}, {0x1.7ap-1, 0x1.36b6776be1p-2, 0x1.16ecdb0f177c8p-46},
+        {0x1.78p-1, 0x1.3c25277333p-2, 0x1.83b54b606bd5cp-46}, {0x1.75p-1, 0x1.44591e053ap-2, -0x1.6e95892923d88p-47}};
+    gnc_log_node_ t;
+    t.c = node[j][0];
+    t.hi = node[j][1];
+    t.lo = node[j][2];
+    return t;
+}
+
+/* x = 2^k m and log x = hi + lo + log(1 + r + r_lo) with |r| < 2^-7, |r_lo| <= 2^-62, and hi = 0 or |hi| > |r|. */
+typedef struct {
+    double r, r_lo, hi, lo, c;
+    uint64_t k;
+} gnc_log_offset_;
+
+/* 0.6875 <= m < 1.375. With m in two halves, both products with c are exact; r_lo is what their sum loses. */
+GNC_INLINE gnc_log_offset_ gnc_log_from_node_(double x) {
+    const double up = x < 0x1p-1022 ? 0x1p54 : 1.0; /* subnormal numbers have no exponent to read */
+    const uint64_t shifted = gnc_bits_(x * up) - UINT64_C(0x3fe6000000000000) + UINT64_C(0x4000000000000000);
+    const uint64_t biased = shifted >> 52;
+    const double m = gnc_from_bits_((shifted & UINT64_C(0xfffffffffffff)) + UINT64_C(0x3fe6000000000000));
+    const double k = (gnc_from_bits_(gnc_bits_(0x1p52) + biased) - (0x1p52 + 1024.0)) - (up > 1.0 ? 54.0 : 0.0);
+    const gnc_log_node_ node = gnc_log_node_at_((shifted >> 45) & 127u);
+    const double head = gnc_from_bits_(gnc_bits_(m) & UINT64_C(0xffffffff00000000));
+    gnc_log_offset_ p;
+    const double coarse = head * node.c - 1.0, fine = (m - head) * node.c;
+    p.r = coarse + fine;
+    p.r_lo = (coarse - p.r) + fine;
+    p.hi = k * 0x1.62e42fefa38p-1 + node.hi;
+    p.lo = k * 0x1.ef35793c7673p-45 + node.lo;
+    p.c = node.c;
+    p.k = biased - 1024u;
+    return p;
+}
+
+/* log(1 + r) - r + r^2/2 for |r| < 2^-7. */
+GNC_INLINE double gnc_log_rest_(double r) {
+    const double r2 = r * r, r3 = r * r2;
+    const double p0 = gnc_poly3_(r, 0x1.5555555555555p-2, -0x1.ffffffffffff9p-3, 0x1.99999999967a1p-3);
+    const double p3 = gnc_poly3_(r, -0x1.5555555631f13p-3, 0x1.24924e5eb1712p-3, -0x1.000094ed13f24p-3);
+    return r3 * (p0 + r3 * (p3 + r3 * 0x1.c27b69da9bd16p-4));
+}
+
+/* log(1 + x): what is lost in rounding 1 + x comes back as a correction. All x; max 0.67 ulp. */
 GNC_INLINE double gnc_log1p(double x) {
     const gnc_pair_ u = gnc_sum_(1.0, x);
-    const gnc_log_parts_ p = gnc_log_reduce_(u.hi);
-    const double lost = u.lo * gnc_exp2i_(0u - (x < 0x1p100 ? p.k_bits : 100u));
-    const gnc_pair_ f = gnc_sum_sorted_(p.m - 1.0, lost);
-    const double y = gnc_log_sum_(p.k, f.hi, f.lo - f.lo * f.hi);
+    const gnc_log_offset_ p = gnc_log_from_node_(u.hi);
+    const double lost = u.lo * (p.c * gnc_exp2i_(0u - (x < 0x1p100 ? p.k : 100u)));
+    const gnc_pair_ s = gnc_sum_sorted_(p.hi, p.r);
+    const double rest = (lost - lost * p.r) + (gnc_log_rest_(p.r) - 0.5 * p.r * p.r);
+    const double y = s.hi + (s.lo + (p.lo + rest));
     const double finite = x < gnc_inf_() ? y : x;
     const double nonzero = x == 0.0 ? x : finite;
     const double above = x > -1.0 ? nonzero : -gnc_inf_();
@@ -485,52 +675,25 @@ GNC_INLINE double gnc_log1p(double x) {
 /* ---- Power ----------------------------------------------------------------------------------------- */
 
 /*
- * log x as a pair good to about 2^-65, for x > 0 and finite: y log x reaches 745, so a power needs ten bits
- * more than a double. 2 atanh(s) = s (2 + z (2/3 + z P(z))), z = s^2, with every sum but P's in pairs.
+ * log x as a pair good to about 2^-65, for x > 0 and finite: y log x reaches 745, so a power needs ten bits more than a
+ * double.
  */
 GNC_INLINE gnc_pair_ gnc_log_pair_(double x) {
-    const gnc_log_parts_ parts = gnc_log_reduce_(x);
-    gnc_pair_ n, s, z, c, g, u, l;
-    n.hi = parts.m - 1.0;
-    n.lo = 0.0;
-    s = gnc_quotient_(n, gnc_sum_sorted_(1.0, parts.m));
-    z.hi = s.hi * s.hi;
-    z.lo = gnc_product_error_(s.hi, s.hi, z.hi) + 2.0 * s.hi * s.lo;
-    const double z3 = z.hi * z.hi * z.hi;
-    const double p0 = gnc_poly3_(z.hi, 0x1.9999999999996p-2, 0x1.2492492493039p-2, 0x1.c71c71c57fdd7p-3);
-    const double p3 = gnc_poly3_(z.hi, 0x1.745d183295606p-3, 0x1.3b1362a44a29bp-3, 0x1.1120b84c2bfc9p-3);
-    const double p6 = 0x1.de330479608a2p-4 + z.hi * 0x1.eb14a628fba0cp-4;
-    const double p = p0 + z3 * (p3 + z3 * p6);
-    c = gnc_sum_sorted_(0x1.5555555555555p-1, z.hi * p);
-    c.lo += 0x1.5555555555555p-55 + z.lo * p;
-    g.hi = z.hi * c.hi;
-    g.lo = gnc_product_error_(z.hi, c.hi, g.hi) + (z.hi * c.lo + z.lo * c.hi);
-    u = gnc_sum_sorted_(2.0, g.hi);
-    u.lo += g.lo;
-    l.hi = s.hi * u.hi;
-    l.lo = gnc_product_error_(s.hi, u.hi, l.hi) + (s.hi * u.lo + s.lo * u.hi);
-    const gnc_pair_ sum = gnc_sum_sorted_(parts.k * 0x1.62e42fefa38p-1, l.hi);
-    return gnc_sum_sorted_(sum.hi, sum.lo + (l.lo + parts.k * 0x1.ef35793c7673p-45));
+    const gnc_log_offset_ p = gnc_log_from_node_(x);
+    const gnc_pair_ half = gnc_half_square_(p.r);
+    const gnc_pair_ s = gnc_sum_sorted_(p.hi, p.r);
+    const gnc_pair_ l = gnc_sum_sorted_(s.hi, -half.hi);
+    const double rest = (p.r_lo - p.r_lo * p.r) + (gnc_log_rest_(p.r) - half.lo);
+    return gnc_sum_sorted_(l.hi, (s.lo + l.lo) + (p.lo + rest));
 }
 
-/* x^y = e^(y log x). All x and y; max 0.76 ulp. */
-GNC_INLINE double gnc_pow(double x, double y) {
+/* x^y from |x|^y where both are finite and x is not zero. */
+GNC_INLINE double gnc_pow_special_(double x, double y, double size) {
     const double a = gnc_fabs(x), b = gnc_fabs(y), inf = gnc_inf_();
-    /* |log a| >= 2^-53 unless a = 1, so a larger |y| than 2^66 overflows or underflows all the same. */
-    const double power = gnc_copysign(b > 0x1p66 ? 0x1p66 : b, y);
-    const gnc_pair_ l = gnc_log_pair_(a);
-    gnc_pair_ e;
-    e.hi = power * l.hi;
-    e.lo = gnc_product_error_(power, l.hi, e.hi) + power * l.lo;
-    const double e_hi = gnc_fabs(e.hi) < 800.0 ? e.hi : gnc_copysign(800.0, e.hi);
-    const double e_lo = gnc_fabs(e.hi) < 800.0 ? e.lo : 0.0;
-    const gnc_exp_parts_ parts = gnc_exp_reduce_(e_hi, e_lo);
-    const gnc_pair_ s = gnc_sum_sorted_(1.0, parts.r);
-    const double size = gnc_scale_(s.hi + (s.lo + parts.t), parts.k);
-
     const double of_zero = y < 0.0 ? inf : 0.0;
     const double of_inf = y < 0.0 ? 0.0 : inf;
-    const double from_zero = a > 0.0 ? size : of_zero;
+    const double from_one = a == 1.0 ? 1.0 : size; /* for an infinite y */
+    const double from_zero = a > 0.0 ? from_one : of_zero;
     const double magnitude = a < inf ? from_zero : of_inf;
     /* Doubles from 2^53 on are even. y is an integer (odd) when rounding y (y/2) changes nothing (something). */
     const double whole = b < 0x1p52 ? (b + 0x1p52) - 0x1p52 : b;
@@ -546,6 +709,22 @@ GNC_INLINE double gnc_pow(double x, double y) {
     const double ok = x == x ? y_ok : gnc_nan_();
     const double y_zero = y == 0.0 ? 1.0 : ok; /* 1 even for a NaN base, by Annex F */
     return x == 1.0 ? 1.0 : y_zero;
+}
+
+/* x^y = e^(y log x). All x and y; max 0.76 ulp. */
+GNC_INLINE double gnc_pow(double x, double y) {
+    const gnc_pair_ l = gnc_log_pair_(gnc_fabs(x));
+    const double y_head = gnc_from_bits_(gnc_bits_(y) & UINT64_C(0xfffffffff8000000)), l_head = gnc_head_(l.hi);
+    const double e_hi = y_head * l_head;
+    const double e_lo = (y - y_head) * l_head + y * ((l.hi - l_head) + l.lo);
+    const double size = gnc_fabs(y * l.hi); /* from 800 on, infinity or zero; a NaN is not below either */
+    const double capped = GNC_CHOOSE_(size < 800.0, e_hi, gnc_copysign(800.0, e_hi));
+    const gnc_exp_parts_ e = gnc_exp_reduce_(capped, GNC_CHOOSE_(size < 800.0, e_lo, 0.0));
+    double z = gnc_scale_(e.hi + e.lo, e.k);
+    if ((GNC_LANES != 0) || !((x > 0.0) && (x < gnc_inf_()) && (size < 800.0))) {
+        z = gnc_pow_special_(x, y, z);
+    }
+    return z;
 }
 
 /* ---- Trigonometry ---------------------------------------------------------------------------------- */
