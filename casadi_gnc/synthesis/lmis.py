@@ -144,7 +144,8 @@ class Lmis:
 
         Parameters
         ----------
-        backend : name, see `casadi_gnc.synthesis.backends`, or a module of your own like those; by size if left out.
+        backend : name, see `casadi_gnc.synthesis.backends`, or a module of your own like those; if left out it is taken
+            by size, and where it decides nothing, another one is asked.
         conflict : whether to seek a smallest set of conflicting constraints if there is no point.
         within : range that a proof of infeasibility must cover: a bound on the entries of all unknowns, in their
             units, or one by name. By default it must hold for all unknowns, but for the last digits of the
@@ -189,13 +190,20 @@ class Lmis:
             it they end the search undecided, for a caller who asks for the proof later.
         """
         scaled = first_scaling(data)
-        backend = backends.by_size(len(data.cost)) if backend is None else backend
-        looks = Looks(backends.module(backend), within, prove, options)
-        try:
-            look = looks.best(scaled)
-        except TypeError as error:
-            raise SynthesisError(f"back end {backend!r}: {error}") from error
-        return self._answer(data, backend, scaled.unit, look.verdict, look.found)
+        asked = backends.by_size(len(data.cost)) if backend is None else (backend,)
+        look, taken = None, backend
+        for one in asked[:1] if options else asked:  # options are those of one back end
+            looks = Looks(backends.module(one), within, prove, options)
+            try:
+                other = looks.best(scaled)
+            except TypeError as error:
+                raise SynthesisError(f"back end {one!r}: {error}") from error
+            if look is None or other.verdict.rank > look.verdict.rank:
+                look, taken = other, one
+            if not look.verdict.is_lacking:
+                break
+        assert look is not None
+        return self._answer(data, taken, scaled.unit, look.verdict, look.found)
 
     def _answer(self, data: ConicData, backend: Any, natural: np.ndarray, verdict: Verdict, found: Found) -> LmiAnswer:
         far = np.abs(verdict.point) > _FAR * natural

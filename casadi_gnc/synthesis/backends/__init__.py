@@ -8,7 +8,7 @@ A back end is a module with
 `Found` is what the solver says; nothing of it is believed: `casadi_gnc.synthesis.certificate`
 recomputes everything from the data in original units.
 
-Where no back end is named, `by_size` names one.
+Where no back end is named, `by_size` names those that are asked, one after another until one decides.
 """
 
 from __future__ import annotations
@@ -85,9 +85,9 @@ def names() -> list[str]:
     return REGISTRY.names()
 
 
-def by_size(count: int) -> str:
-    """Return the name of the back end that is taken for so many unknowns where none is asked for."""
-    return "barrier" if count > _MANY else "clarabel"
+def by_size(count: int) -> tuple[str, ...]:
+    """Return the names of the back ends that are asked in turn, with so many unknowns, where none is named."""
+    return ("barrier", "clarabel") if count > _MANY else ("clarabel", "barrier")
 
 
 def module(name: Any) -> Any:
