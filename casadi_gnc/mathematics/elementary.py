@@ -11,6 +11,9 @@ All take and return arrays of float64 of any shape.
 
 from __future__ import annotations
 
+from decimal import Decimal, localcontext
+from functools import cache
+
 import numpy as np
 
 _ROUNDER = float.fromhex("0x1.8p52")
@@ -21,11 +24,9 @@ def _numbers(text: str) -> tuple[float, ...]:
     return tuple(float.fromhex(each) for each in text.split())
 
 
-_EXP = _numbers(
-    "0x1.5555555555555p-3 0x1.5555555555557p-5 0x1.1111111111113p-7 0x1.6c16c16c156bep-10 0x1.a01a01a0182f5p-13 "
-    "0x1.a01a01ab5080bp-16 0x1.71de3a6039c59p-19 0x1.27e4d0c2cc937p-22 0x1.ae64162a64a83p-26 0x1.1f84a6dfe7011p-29 "
-    "0x1.61e08d3407238p-33"
-)
+_LN2_64TH = _numbers("0x1.62e42fefap-7 0x1.cf79abc9e3b3ap-46")
+_64_OVER_LN2 = float.fromhex("0x1.71547652b82fep+6")
+_EXP = _numbers("0x1.5555555555252p-3 0x1.55555555553d4p-5 0x1.11111d9625013p-7 0x1.6c16cdf12aa29p-10")
 _LOG = _numbers(
     "0x1.5555555555592p-1 0x1.999999997fd11p-2 0x1.24924941fb26cp-2 0x1.c71c5200a378ap-3 0x1.746640cfef102p-3 "
     "0x1.39a186c8ecd3cp-3 0x1.2f0789afb6648p-3"
@@ -48,20 +49,27 @@ def exp(x: np.ndarray) -> np.ndarray:
     """Return e^x."""
     x = np.asarray(x, dtype=float)
     with np.errstate(invalid="ignore", over="ignore", under="ignore"):
-        capped = np.where(x > 710.0, 710.0, np.where(x < -746.0, -746.0, np.where(np.isnan(x), 0.0, x)))
-        shifted = capped * float.fromhex("0x1.71547652b82fep+0") + _ROUNDER
-        k = shifted - _ROUNDER
-        r, r_lo = _sum(capped - k * _LN2_HEAD, 0.0 - k * _LN2_TAIL)
+        capped = np.where(np.abs(x) < 746.0, x, np.copysign(746.0, np.where(np.isnan(x), 0.0, x)))
+        shifted = capped * _64_OVER_LN2 + _ROUNDER
+        n = shifted - _ROUNDER
+        r = (capped - n * _LN2_64TH[0]) + (0.0 - n * _LN2_64TH[1])
         r2 = r * r
-        r3 = r * r2
-        p9 = _EXP[9] + r * _EXP[10]
-        p = _poly3(r, *_EXP[:3]) + r3 * (_poly3(r, *_EXP[3:6]) + r3 * (_poly3(r, *_EXP[6:9]) + r3 * p9))
-        t = (0.5 * r2 + r3 * p) + (r_lo + r_lo * r)
-        hi, lo = _sum_sorted(1.0, r)
-        count = _bits(shifted) - _bits(np.array(_ROUNDER))
-        half = ((count + 4096) >> 1) - 2048
-        scaled = ((hi + (lo + t)) * _power_of_2(half)) * _power_of_2(count - half)
+        high = (_EXP[1] + r * _EXP[2]) + r2 * _EXP[3]
+        hi, lo = (nodes[_bits(shifted) & 63] for nodes in _roots_of_two())
+        y = hi + (lo + hi * (r + r2 * ((0.5 + r * _EXP[0]) + r2 * high)))
+        k = (_bits(shifted) - _bits(np.array(_ROUNDER))) >> 6
+        half = ((k + 4096) >> 1) - 2048
+        scaled = (y * _power_of_2(half)) * _power_of_2(k - half)
     return np.where(np.isnan(x), np.nan, scaled)
+
+
+@cache
+def _roots_of_two() -> _Pair:
+    """Return 2^(j/64) for j from 0 to 63, each rounded once, and what that leaves."""
+    with localcontext(prec=60):
+        exact = [Decimal(2) ** (Decimal(j) / 64) for j in range(64)]
+        hi = [float(each) for each in exact]
+        return np.array(hi), np.array([float(each - Decimal(near)) for each, near in zip(exact, hi, strict=True)])
 
 
 def log(x: np.ndarray) -> np.ndarray:

@@ -104,6 +104,10 @@ class FaultHandling:
     def of_function(self, own: FlightFunction) -> Faults:
         """Return the same for the package of a function: a failure is a refused step, and all outputs are held at once.
 
+        Parameters
+        ----------
+        own : the function as it is packed, with its ports and period.
+
         Raises
         ------
         FaultHandlingError

@@ -34,7 +34,7 @@
  * residuals hides so small a gap (f tiny against that size), they are summed with twice the digits, in float always.
  * If M1 = M2 = 0 the forces are not unique and the set-up
  * adds M1 = 1e-9 h |A0|_F^2 I (float: 1e-5), which is part of f and of its certificate; up to 1e-5 f (float: 1e-3)
- * counts as rounding then. Single zero weights are allowed and nothing is added; in float few of these are certified.
+ * counts as rounding then. Single zero weights are allowed and nothing is added; in float a third of these is not certified.
  *
  * The header may be included again with other sizes and another prefix. No heap, no globals, no
  * recursion, every loop is bounded; all state lies in the caller's structs, so calls on different
