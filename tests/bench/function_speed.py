@@ -66,36 +66,52 @@ def casadis(function: ca.Function, *, best: bool) -> str:
     return generator.dump() + LOOP % f"{function.name()}(given, found, iw, w, 0);"
 
 
-def nanoseconds(text: str, function: ca.Function) -> float:
-    """Return the least processor time of a call."""
-    rng = np.random.default_rng(1)
-    given = [rng.normal(size=max(function.nnz_in(i), 1)) for i in range(function.n_in())]
-    found = [np.zeros(max(function.nnz_out(i), 1)) for i in range(function.n_out())]
-    room = [np.zeros(100_000), np.zeros(100_000, np.int64)]
-    with tempfile.TemporaryDirectory() as place:
-        (Path(place) / "f.c").write_text(text)
-        words = [*FLAGS, f"-I{assets.folder('codegen') / 'runtime'}", "-o", f"{place}/f.so", f"{place}/f.c", "-lm"]
-        compilers.compile_in(Path(place), compilers.find(), words, "a function")
-        c = ctypes.CDLL(f"{place}/f.so")
+class Timed:
+    """Hold a function in C with numbers to call it on.
 
-    def pointers(arrays: list[np.ndarray]) -> ctypes.Array:
-        # Ports beyond the last are work space of CasADi's C.
-        return (ctypes.c_void_p * (len(arrays) + 1000))(*(each.ctypes.data for each in arrays))
+    Parameters
+    ----------
+    text : C with `bench` of LOOP.
+    function : whose ports it has.
+    """
 
-    def run(times: int) -> float:
+    def __init__(self, text: str, function: ca.Function) -> None:
+        rng = np.random.default_rng(1)
+        self.given = [rng.normal(size=max(function.nnz_in(i), 1)) for i in range(function.n_in())]
+        self.found = [np.zeros(max(function.nnz_out(i), 1)) for i in range(function.n_out())]
+        self._room = [np.zeros(100_000, np.int64), np.zeros(100_000)]
+        with tempfile.TemporaryDirectory() as place:
+            (Path(place) / "f.c").write_text(text)
+            words = [*FLAGS, f"-I{assets.folder('codegen') / 'runtime'}", "-o", f"{place}/f.so", f"{place}/f.c", "-lm"]
+            compilers.compile_in(Path(place), compilers.find(), words, "a function")
+            self._c = ctypes.CDLL(f"{place}/f.so")
+
+    def run(self, times: int) -> float:
+        """Call it so many times; return the processor time [ns]."""
+
+        def pointers(arrays: list[np.ndarray]) -> ctypes.Array:
+            # Ports beyond the last are work space of CasADi's C.
+            return (ctypes.c_void_p * (len(arrays) + 1000))(*(each.ctypes.data for each in arrays))
+
+        room = [ctypes.c_void_p(each.ctypes.data) for each in self._room]
         begun = time.process_time_ns()
-        c.bench(
-            pointers(given),
-            pointers(found),
-            *(ctypes.c_void_p(each.ctypes.data) for each in room[::-1]),
-            ctypes.c_long(times),
-        )
+        self._c.bench(pointers(self.given), pointers(self.found), *room, ctypes.c_long(times))
         return float(time.process_time_ns() - begun)
 
-    times = 10
-    while run(times) < LEAST_NS:
+
+def answers(text: str, function: ca.Function) -> list[np.ndarray]:
+    """Return what one call gives."""
+    timed = Timed(text, function)
+    timed.run(1)
+    return timed.found
+
+
+def nanoseconds(text: str, function: ca.Function) -> float:
+    """Return the least processor time of a call."""
+    timed, times = Timed(text, function), 10
+    while timed.run(times) < LEAST_NS:
         times *= 4
-    return min(run(times) for _ in range(RUNS)) / times
+    return min(timed.run(times) for _ in range(RUNS)) / times
 
 
 def families(*, everything: bool) -> dict[str, list[ca.Function]]:
